@@ -1,12 +1,12 @@
-"""Axes that rub, of which the owner knows the mass alone, as data sets of positioning systems have them.
+"""Diagnosis of axes with friction whose description has only a mass, as in data sets of positioning systems.
 
     python benchmarks/bare_axes.py [--count 8] [--seed 100] [--jobs 2] [--out FOLDER] [--json]
 
-`rtctl prove` conceals effects in machines whose owner knows that they rub. Here nobody wrote friction down: 20 s at
-1 kHz under a cascaded law, moves at a tenth to all of the top speed, a mass off by up to 10 %, an encoder of 1 in
-500 000. Every axis has dry friction on bristles and viscous friction; beside that it sticks, gives by more than
-microns, rubs more one way, or is pushed. The equations here share nothing with plants/ or rtctl/diagnose/. Case k of a
-seed is the same in every run.
+`rtctl prove` conceals effects in machines with described friction. Here the description has no friction: 20 s at 1 kHz
+under a cascaded law, moves at a tenth to all of the top speed, a mass off by up to 10 %, an encoder of 1 in 500 000.
+Every axis has dry friction on bristles and viscous friction, and in addition stick-slip, visible presliding, asymmetric
+friction, or a constant force. The equations share no code with plants/ or rtctl/diagnose/. Case k of a seed is
+reproducible.
 
 Source: Canudas de Wit, Olsson, Astrom & Lischinsky, A new model for control of systems with friction, IEEE TAC 40
 (1995); Janot, Gautier & Brunot, Data set and reference models of EMPS (2019) for the kind.
@@ -20,9 +20,9 @@ import numpy as np
 from concealed import run, write
 from numba import njit
 
-DT, FINE, SECONDS = 1e-3, 40, 20.0  # s, steps of the integration a sample, s
+DT, FINE, SECONDS = 1e-3, 40, 20.0  # s, integration steps per sample, s
 LIMIT = 10.0  # V
-BRISTLES = "friction.presliding"  # of microns everywhere: told or not, it is right
+BRISTLES = "friction.presliding"  # microns in every case: its name is right whether reported or not
 PLAIN = ("friction.coulomb", "friction.viscous")
 KINDS: tuple[tuple[tuple[str, ...], dict[str, float]], ...] = (
     ((), {}),
@@ -37,7 +37,7 @@ KINDS: tuple[tuple[tuple[str, ...], dict[str, float]], ...] = (
 
 
 class Carriage(NamedTuple):
-    """What moves, and what resists it."""
+    """Mass and friction of an axis."""
 
     M: float
     F_v: float
@@ -51,19 +51,19 @@ class Carriage(NamedTuple):
 
 
 class Loop(NamedTuple):
-    """What drives it."""
+    """Drive, law and encoder of an axis."""
 
     kp: float
     kv: float
     gain: float  # N/V
-    step: float  # m, of the encoder
+    step: float  # m, encoder step
 
 
 @njit
 def moved(c: Carriage, loop: Loop, ref: np.ndarray, noise: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Readings and volts (n,), with `noise` (n,) in steps of the encoder.
+    """Readings in m and voltages in V, (n,) each, with `noise` (n,) in encoder steps.
 
-    Semi-implicit Euler for the motion, the bristles exactly over each step.
+    Semi-implicit Euler for the motion; exact solution of the bristles over each step.
     """
     x = v = z = x_last = mean_last = 0.0
     shown, volts, h = np.empty(len(ref)), np.empty(len(ref)), DT / FINE
@@ -88,7 +88,7 @@ def moved(c: Carriage, loop: Loop, ref: np.ndarray, noise: np.ndarray) -> tuple[
 
 
 def moves(rng: np.random.Generator, span: float, speeds: np.ndarray) -> np.ndarray:
-    """Reference (n,) m: from place to place, each move at one of the speeds, with rests between."""
+    """Reference (n,) in m: moves at one of the speeds each, with rests between."""
     ref, at, i = np.zeros(int(SECONDS / DT)), 0.0, 0
     while i < len(ref):
         target, speed = rng.uniform(-span, span), rng.choice(speeds)
@@ -100,7 +100,7 @@ def moves(rng: np.random.Generator, span: float, speeds: np.ndarray) -> np.ndarr
 
 
 def conceal(folder: Path, seed: int, k: int) -> tuple[str, ...]:
-    """Write case k as a bundle; what is in it beside plain friction comes back."""
+    """Write case k as a bundle; returns its effects beside plain friction."""
     rng, (what, size) = np.random.default_rng(seed + k), KINDS[k % len(KINDS)]
     M, span = 10 ** rng.uniform(0, 2), 10 ** rng.uniform(-1.3, -0.3)
     top = span * rng.uniform(1.5, 3)
@@ -126,7 +126,7 @@ def conceal(folder: Path, seed: int, k: int) -> tuple[str, ...]:
 
 
 def judged(hidden: dict[str, tuple[str, ...]], out: Path) -> dict[str, Any]:
-    """How many were told rightly: all that is there and nothing else; `ambiguous` with all of it counts apart."""
+    """Number of right diagnoses (all effects and no other); `ambiguous` with all effects counts separately."""
     right, among, others = 0, 0, {}
     for case, what in hidden.items():
         told = json.loads((out / case / "diagnosis.json").read_text())
@@ -140,7 +140,7 @@ def judged(hidden: dict[str, tuple[str, ...]], out: Path) -> dict[str, Any]:
 
 
 def told(found: dict[str, Any]) -> list[str]:
-    """Lines of what was found."""
+    """Result as lines of text."""
     return [f"{found['right']} of {found['cases']} right, {found['ambiguous_with_it']} more ambiguous with all of it"]
 
 

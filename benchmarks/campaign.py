@@ -1,12 +1,11 @@
-"""How a campaign scales: a local Dask cluster of 1 worker and of 2, in turns, on the same runs.
+"""Scaling of a campaign: a local Dask cluster with 1 worker and with 2, alternately, on equal runs.
 
     python benchmarks/campaign.py [--json] [--runs N] [--windows N]
 
 Each window computes runs of configs/campaigns/radii_10000.yaml. Workers are warm: each has computed a chunk before.
 
-On a busy machine the wall time says who else was there. So CPU times are told as well: W of the workers, S of
-scheduler and client, which take turns with them on two CPUs. `speed_up_by_cpu` is 2 W / (W + S), what two CPUs that
-have nothing else to do would come to.
+Wall time depends on other load. Therefore CPU times are also reported: W of the workers, S of scheduler and client,
+which share two CPUs with the workers. `speed_up_by_cpu` is 2 W / (W + S), the speed-up on two otherwise idle CPUs.
 """
 
 import argparse
@@ -28,14 +27,14 @@ TARGET = 1.7
 
 
 def timed(plan: Plan, chunks: range, scheduler: str) -> tuple[float, list[Any]]:
-    """Seconds of wall time for these chunks, the connection to the scheduler included, and their rows in order."""
+    """Wall time in s for these chunks, including the connection to the scheduler, and their rows in order."""
     before = time.perf_counter()
     found = dict(pools.compute(plan, chunks, 1, scheduler))
     return time.perf_counter() - before, [found[chunk] for chunk in chunks]
 
 
 def everywhere(cluster: Any, function: Any, *arguments: Any) -> list[Any]:
-    """What a function returns in each worker."""
+    """Results of a function in each worker."""
     from distributed import Client
 
     with Client(cluster) as client:
@@ -43,7 +42,7 @@ def everywhere(cluster: Any, function: Any, *arguments: Any) -> list[Any]:
 
 
 def measure(runs: int, windows: int) -> dict[str, Any]:
-    """Wall times of both clusters, in turns, and whether their rows are the same."""
+    """Wall times of both clusters, measured alternately, and whether their rows are equal."""
     from distributed import LocalCluster
 
     plan = load_plan(CAMPAIGN, load_config)

@@ -1,11 +1,11 @@
-"""Whether a thousand commands a second move the loop: its lateness with and without them, within one run.
+"""Effect of a thousand commands a second on the loop: lateness with and without commands, within one run.
 
     python benchmarks/commands.py [--json] [--machine ldu|ivu] [--seconds S] [--window S] [--rate N]
 
-A machine runs in real mode. Windows with commands and windows without take turns, so that what the computer does
-meanwhile falls on both alike. A command is a setpoint: it goes through the socket, the supervisor and the mailbox into
-the tick; its answer is read. Lateness is that of every tick, from the recording of the run. The ratio of a pair of
-windows is with over without; the result is the median over the pairs.
+A machine runs in real mode. Windows with and without commands alternate, so that other load affects both equally. A
+command is a setpoint: it goes through the socket, the supervisor and the mailbox into the tick, and its answer is read.
+Lateness of every tick comes from the recording of the run. The ratio of a pair of windows is with over without
+commands; the result is the median over the pairs.
 """
 
 import argparse
@@ -26,15 +26,15 @@ import numpy as np
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 SHARES = {"p50": 0.5, "p99": 0.99, "p999": 0.999}
-EDGE = 0.1  # s at either end of a window that is left out: its last answers, the first commands
+EDGE = 0.1  # s left out at either end of a window: transition between commands and none
 START = 180.0  # s; a cold cache compiles
 
 
 class Window(NamedTuple):
-    commands: int  # sent
+    commands: int  # commands sent
     answered: int
     refused: int
-    first: int  # tick
+    first: int  # first tick
     last: int
 
 
@@ -46,7 +46,7 @@ def rtctl_command() -> tuple[str, ...]:
 
 @contextlib.contextmanager
 def running(machine: str, out: Path) -> Iterator[Any]:
-    """A machine that runs, and a client of it; it is stopped at the end and its recording is finished."""
+    """Running machine and a client; at the end the machine stops and its recording is finished."""
     from rtctl.config.errors import UserError
     from rtctl.daemon.client import Client
     from rtctl.daemon.server import find_endpoint
@@ -58,7 +58,7 @@ def running(machine: str, out: Path) -> Iterator[Any]:
         "--set", "safety.link_timeout=5",
     )  # fmt: skip
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
-    os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})  # ours, not the loop's CPU
+    os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})  # keeps this process off the CPU of the loop
     try:
         with Client(find_endpoint(name, "command"), timeout=5.0) as client:
             deadline = time.monotonic() + START
@@ -79,7 +79,7 @@ def running(machine: str, out: Path) -> Iterator[Any]:
 
 
 def window(client: Any, rate: float, seconds: float) -> Window:
-    """`seconds` with `rate` commands a second, none where it is 0. Every command's answer is read."""
+    """Window of `seconds` with `rate` commands a second (0: none). The answer of every command is read."""
     import zmq
 
     from rtctl.daemon.protocol import decode_reply, encode_request
@@ -92,7 +92,7 @@ def window(client: Any, rate: float, seconds: float) -> Window:
     began = time.monotonic()
     while (now := time.monotonic() - began) < seconds:
         while sent < now * rate:
-            socket.send(encode_request(sent, "setpoint", {"value": 0.0}))  # where it stands
+            socket.send(encode_request(sent, "setpoint", {"value": 0.0}))  # present position
             sent += 1
         left = (sent + 1) / rate - (time.monotonic() - began) if rate else seconds - now
         ready = socket.poll(int(max(0, min(left, seconds - now)) * 1000))
@@ -107,7 +107,7 @@ def window(client: Any, rate: float, seconds: float) -> Window:
 
 
 def measure(machine: str, rate: float, seconds: float, length: float, folder: Path) -> dict[str, Any]:
-    """All windows and what they say; `seconds` of commands, in windows of `length`."""
+    """Results of all windows: `seconds` of commands in windows of `length` s."""
     from rtctl.trace.bundle import load_bundle
 
     pairs = max(1, round(seconds / length))
@@ -151,7 +151,7 @@ def measure(machine: str, rate: float, seconds: float, length: float, folder: Pa
 
 
 def percentiles(lateness: np.ndarray) -> dict[str, float]:
-    """Of lateness in s, in us."""
+    """Percentiles in us of lateness in s."""
     return {name: round(float(np.quantile(lateness, share)) * 1e6, 3) for name, share in SHARES.items()}
 
 

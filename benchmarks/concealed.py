@@ -1,4 +1,4 @@
-"""What benchmarks of the diagnosis share: cases made, diagnosed by the command, judged, printed."""
+"""Common functions of diagnosis benchmarks: generate, diagnose, score and print cases."""
 
 import argparse
 import json
@@ -13,12 +13,12 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from lateness import rtctl_command
 
-Hidden = TypeVar("Hidden")  # what is in a case
+Hidden = TypeVar("Hidden")  # content of a case
 USUAL = {"format": 1, "plant": "axis", "delay_samples": 0.0, "reaches": {"parameter_tolerance": 0.15}}
 
 
 def write(folder: Path, columns: dict[str, np.ndarray], case: dict[str, Any]) -> None:
-    """A bundle of these columns (n,) in a new folder, ref 0 where there is none, of a `case` that is else as USUAL."""
+    """Write a bundle of columns (n,) to a new folder; `ref` defaults to 0, `case` to USUAL."""
     folder.mkdir(parents=True)
     zero = np.zeros(len(columns["t"]))
     pq.write_table(pa.table({"t": zero, "ref": zero, "w": zero, **columns}), folder / "recording.parquet")
@@ -33,8 +33,11 @@ def run(
     count: int,
     seed: int,
 ) -> None:
-    """The command line of a benchmark with this help `text` and usual `count` and `seed`: `conceal(folder, seed, k)`
-    writes case k, `judged(hidden, folder)` counts what the diagnoses say, `told(found)` are lines of that."""
+    """Command line of a benchmark with help `text` and default `count` and `seed`.
+
+    `conceal(folder, seed, k)` writes case k, `judged(hidden, folder)` scores the diagnoses, `told(found)` returns the
+    result as lines.
+    """
     parser = argparse.ArgumentParser(description=text, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--count", type=int, default=count)
     parser.add_argument("--seed", type=int, default=seed)

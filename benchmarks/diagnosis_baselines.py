@@ -1,4 +1,4 @@
-"""Simple ways to find missing physics, scored on the same concealed cases as `rtctl diagnose`.
+"""Scores of baseline methods on the concealed cases of `rtctl diagnose`.
 
     python benchmarks/diagnosis_baselines.py CASES [--out FOLDER] [--only METHOD ...] [--cases N] [--json]
 
@@ -36,7 +36,7 @@ METHODS: dict[str, tuple[str, Callable[[Record], dict[str, Any]]]] = {
 
 
 def answers_of(folder: Path) -> dict[str, Any]:
-    """The opened answers by case. Raises UserError where there are none."""
+    """Opened answers by case. Raises UserError where they are missing."""
     if (folder / SEAL).is_file():
         found = open_seal(folder)
     else:
@@ -51,7 +51,7 @@ def answers_of(folder: Path) -> dict[str, Any]:
 def run(
     name: str, folder: Path, out: Path, cases: list[str], say: Callable[[str], None]
 ) -> tuple[dict[str, Any], float]:
-    """Diagnoses by case and the median of the seconds for one; a case that a method cannot do is missing."""
+    """Diagnoses by case, and median time of a case in s; cases that a method cannot process are missing."""
     method = METHODS[name][1]
     found, seconds = {}, []
     for case in cases:
@@ -70,7 +70,7 @@ def run(
 
 
 def summary(result: dict[str, Any], seconds: float) -> dict[str, Any]:
-    """What the table shows of a score."""
+    """Columns of a score for the table."""
     single, null, unknown, pair = (result[k] for k in ("single", "null", "unknown", "pair"))
     return {
         "cases": result["cases"], "right_name": single["top1"], "right_node": result["node_accuracy"],
@@ -81,7 +81,7 @@ def summary(result: dict[str, Any], seconds: float) -> dict[str, Any]:
 
 
 def table(rows: dict[str, dict[str, Any]]) -> str:
-    """Markdown, a row for each method."""
+    """Markdown table with a row for each method."""
     heads = {
         "right_name": "right name", "right_node": "right node", "named_precision": "names that are right",
         "false_alarm_rate": "false alarms", "false_name_rate": "unknown given a name",

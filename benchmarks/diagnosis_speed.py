@@ -1,11 +1,11 @@
-"""How long a diagnosis takes, and what that is in simulations of the same recording.
+"""Duration of a diagnosis, in seconds and in simulations of the recording.
 
     python benchmarks/diagnosis_speed.py [--json] [--machine ivu|ldu|both] [--plain]
 
-Records the emulated machine with an effect that its model lacks (60 s of the IVU at 500 Hz, 10 s of the LDU at
-10 kHz; `--plain`: with nothing missing), and asks `rtctl diagnose` what is missing, among the whole library and on all
-CPUs, as a process of its own: wall time, CPU time and the most memory. The yardstick is one simulation of the owner's
-model against the same recording in the same minute, the quickest of ten before and ten after.
+Records the emulated machine with an effect missing in its nominal model (60 s of the IVU at 500 Hz, 10 s of the LDU at
+10 kHz; `--plain`: without missing physics). Runs `rtctl diagnose` with the whole library on all CPUs as a separate
+process, and measures wall time, CPU time and peak memory. The reference is one simulation of the nominal model for the
+recording: the fastest of ten before and ten after the diagnosis.
 """
 
 import argparse
@@ -32,7 +32,7 @@ TRIES = 10
 
 
 def record(machine: str, plain: bool, folder: Path) -> Path:
-    """A bundle of steps to and fro all over the recording, with what the plant had on top taken from its case.json."""
+    """Bundle of steps to and fro over the whole recording; its case.json is without the concealed effect."""
     seconds, size, unit, apart, term = MACHINES[machine]
     at = [apart * (k + 0.5) for k in range(int(seconds / apart))]
     steps = [f"  - {{at: {t} s, to: {size * (1, 0, -1, 0)[k % 4]} {unit}}}" for k, t in enumerate(at)]
@@ -53,7 +53,7 @@ def record(machine: str, plain: bool, folder: Path) -> Path:
 
 
 def one_simulation(sim: Simulator) -> float:
-    """Seconds of the quickest of some simulations by the owner's model."""
+    """Shortest time in s of several simulations of the nominal model."""
     model, times = nominal(sim.case), []
     for _ in range(TRIES):
         before = time.perf_counter()
@@ -63,7 +63,7 @@ def one_simulation(sim: Simulator) -> float:
 
 
 def diagnosed(machine: str, plain: bool) -> dict[str, Any]:
-    """What it took, and what it found."""
+    """Durations, memory and result of a diagnosis."""
     with tempfile.TemporaryDirectory(prefix="rtb-", dir="/tmp") as name:
         bundle, out = record(machine, plain, Path(name)), Path(name) / "out"
         sim = Simulator(load(bundle))

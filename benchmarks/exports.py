@@ -1,9 +1,9 @@
-"""Time and size of each export of a long recording, in turns on one machine.
+"""Time and size of each export of a long recording, measured alternately on one machine.
 
     python benchmarks/exports.py [--json] [--minutes M] [--to mcap,mcap-json,parquet]
 
-A recording of 22 columns at 10 kHz is made: a clock, two integers, and sines with noise. `share` is the time of an
-export over that of `mcap-json`; 12 minutes are 7.2 million rows, and take 3 GB on the disk.
+The recording has 22 columns at 10 kHz: a clock, two integers, and sines with noise. `share` is the time of an export
+over that of `mcap-json`. 12 minutes are 7.2 million rows and take 3 GB of disk space.
 """
 
 import argparse
@@ -24,7 +24,7 @@ OF = "mcap-json"
 
 
 def record(folder: Path, minutes: float) -> int:
-    """Write a bundle; returns its rows."""
+    """Write a bundle; returns its number of rows."""
     noise, rows = np.random.default_rng(0), round(minutes * 60 * RATE)
     names = ["t", "tick", "state", *(f"c{k}" for k in range(COLUMNS))]
     kinds = [pa.float64(), pa.int64(), pa.int64(), *[pa.float64()] * COLUMNS]

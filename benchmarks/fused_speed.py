@@ -1,9 +1,9 @@
-"""How fast a machine runs fused, against real time and against hand-written C.
+"""Speed of a fused run, relative to real time and to hand-written C.
 
     python benchmarks/fused_speed.py [--json] [--seconds S] [--windows N]
-    python benchmarks/fused_speed.py --described belt     a described machine, which has no twin in C
+    python benchmarks/fused_speed.py --described belt     a described machine, which has no C program
 
-Each window is a run of the shipped config with the shipped reference from rest, ours and C in turns, on one CPU.
+Each window is a run of the shipped config with the shipped reference from rest, rtctl and C alternately, on one CPU.
 """
 
 import argparse
@@ -24,15 +24,15 @@ from twins import CONFIGS, Ours, Reference, machine_of
 from rtctl import machines
 from rtctl.cli.common import load_config, with_loop
 
-VIRTUAL = {"ivu": 12.0, "ldu": 3.5}  # s, the whole of the reference
-SHORTEST = 0.1  # s of wall time in a window, below which the clock and the call count
+VIRTUAL = {"ivu": 12.0, "ldu": 3.5}  # s, length of the reference
+SHORTEST = 0.1  # s of wall time in a window; in shorter windows clock and call overhead matter
 WATCHED = {"ivu": "truth_capstan", "ldu": "truth_x"}
 TARGETS = {"ivu": 1000.0, "ldu": 100.0}
 FAST = ("-O3", "-march=native", "-ffp-contract=off")
 
 
 def timed(twin: Any, ticks: int, repeats: int) -> float:
-    """Seconds of wall time for `repeats` runs from rest; going back to rest is not timed."""
+    """Wall time in s of `repeats` runs from rest, without the reset to rest."""
     total = 0
     for _ in range(repeats):
         twin.reset()
@@ -43,7 +43,7 @@ def timed(twin: Any, ticks: int, repeats: int) -> float:
 
 
 def measure(kind: str, seconds: float | None, windows: int, folder: Path) -> dict[str, Any]:
-    """One machine: speed, ratio, and how well the two agree."""
+    """Results of one machine: speed, ratio, and agreement of rtctl and C."""
     machine = machine_of(kind)
     ticks = round((seconds or VIRTUAL[kind]) * machine.rate)
     ours = Ours(machine)
@@ -82,7 +82,7 @@ def measure(kind: str, seconds: float | None, windows: int, folder: Path) -> dic
 
 
 def described(name: str, windows: int) -> dict[str, Any]:
-    """A described machine: speed alone."""
+    """Results of a described machine: only its speed."""
     config = load_config(str(CONFIGS / "machines" / f"{name}.yaml"), [])
     machine = machines.build(with_loop(config, "fused", None))
     ours = Ours(machine)
@@ -102,7 +102,7 @@ def described(name: str, windows: int) -> dict[str, Any]:
 
 
 def agree(kind: str, ours: Any, c: Any, ticks: int) -> dict[str, Any]:
-    """Largest difference of the two recordings, relative to the largest value of each column."""
+    """Largest difference of both recordings, relative to the largest value of each column."""
     a, b = ours.rows[:ticks], c.rows[:ticks]
     worst, where = 0.0, None
     for name in a.dtype.names:

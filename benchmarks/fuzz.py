@@ -1,11 +1,11 @@
-"""Everything that reads what comes from outside, fed with a million inputs that nobody would send.
+"""Fuzzing of all readers of external input with a million invalid inputs.
 
     python benchmarks/fuzz.py [--json] [--inputs N] [--seed N] [--target NAME ...] [--patience S]
 
 Inputs are valid messages, frames, configs and recordings with some bytes or some values changed: bits, lengths, depth,
 types, names, numbers. Each target (tests/fuzz/targets.py) runs in a process of its own with bounded memory. A finding
-is an exception that is not declared, a warning, a death, an input that takes longer than `--patience`, or one that
-takes 256 MiB. Exit code 1 where there is one.
+is an undeclared exception, a warning, the death of the process, an input that takes longer than `--patience`, or an
+input that takes 256 MiB. Exit code 1 where there is a finding.
 """
 
 import argparse
@@ -20,7 +20,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "fuzz"))
 
 
 def fuzz(inputs: int, names: list[str], seed: int, patience: float, show: bool) -> dict[str, Any]:
-    """Feed `inputs` in all, shared out as the targets say. Returns what `--json` prints."""
+    """Run `inputs` inputs in total, distributed by the shares of the targets; returns the result of `--json`."""
     from harness import run
     from targets import TARGETS
 

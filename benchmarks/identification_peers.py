@@ -1,14 +1,15 @@
-"""How others identify the machines of real recordings: free-run error on rows that no fit saw, CPU time, and a name.
+"""Comparison of identification methods on real recordings: free-run error on held-out rows, CPU time, and a name.
 
     python benchmarks/identification_peers.py [--json] [--only METHOD...] BUNDLE...
 
-Every method gets the same rows of bundles of one body and one drive (`rtctl import`, examples/real): the first three
-quarters to fit, and position and speed at the first row of the last quarter, from which it runs freely to the end under
-the recorded command. The error is rms by the spread of the readings. Needs `pip install casadi cma "pysindy>=2" jax`.
+Every method gets equal rows of bundles of one body and one drive (`rtctl import`, examples/real). It fits the first
+three quarters. From position and speed at the first row of the last quarter it runs freely to the end under the
+recorded command. The error is rms over the standard deviation of the readings. Needs `pip install casadi cma
+"pysindy>=2" jax`.
 
-    description   the owner's description, its numbers fitted
-    shooting      CasADi: multiple shooting of the owner's structure with viscous and dry friction, as nlgreyfast does
-    cma           CMA-ES over one friction model chosen beforehand, as PACE and BAM do
+    description   the nominal model with fitted numbers
+    shooting      CasADi: multiple shooting of the nominal structure with viscous and dry friction, as in nlgreyfast
+    cma           CMA-ES over one fixed friction model, as in PACE and BAM
     pysindy       sparse regression on a library of terms
     neural        a neural state-space model
     rtctl         `rtctl diagnose` of the rows to fit
@@ -37,7 +38,7 @@ METHODS = {
 
 
 def measured(p: Any, method: str) -> dict[str, Any]:
-    """Error, CPU time and name of one method on one problem; why it is missing where it is."""
+    """Error, CPU time and name of one method on one problem; the reason where it fails."""
     module, function, name = METHODS[method]
     try:
         run: Callable[..., Any] = getattr(importlib.import_module(f"identification.{module}"), function)
@@ -46,7 +47,7 @@ def measured(p: Any, method: str) -> dict[str, Any]:
     began = time.process_time()
     try:
         free, numbers, *verdict = run(p)
-    except Exception as error:  # of a library on a recording that it cannot take: told, not hidden
+    except Exception as error:  # failure of a library: reported
         return {"failed": f"{type(error).__name__}: {error}"[:200], "cpu_s": round(time.process_time() - began, 1)}
     error = p.error(np.asarray(free))
     return {

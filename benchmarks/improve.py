@@ -1,16 +1,16 @@
-"""Concealed machines, diagnosed from a recording, improved on the model that was found, and run again on the truth.
+"""Improvement of concealed machines: diagnosis from a recording, improvement on the found model, run on the truth.
 
     python benchmarks/improve.py [--machines 60] [--seed 71] [--jobs 2] [--out FOLDER] [--json]
 
-The machines are the reel unit, the linear drive, the belt axis and the arm in turn, each with one effect that a seed
-draws (which, where, how large). A recording of its ordinary reference is diagnosed without knowledge of the effect. The
-improved law then runs on the concealed machine, beside the law that it had, with the same reference; the error is that
-of the emulator's truth. Margins are those of the fitted model. Results of each machine are kept in --out: a run that
-was stopped goes on where it was.
+The machines are the reel unit, the linear drive, the belt axis and the arm in turn, each with one effect drawn by a
+seed (name, node, size). A recording of the usual reference is diagnosed without knowledge of the effect. The improved
+law and the previous law then run on the concealed machine with an equal reference; errors are true errors of the
+emulator. Margins are those of the fitted model. Results of each machine are kept in --out: an interrupted run
+continues.
 
 Prints {"machines", "median_rms_reduction", "improved_share", "worse_share", "least_gain_margin_db",
-"least_phase_margin_deg"}; a machine that nothing improves counts as a reduction of 0. Margins are the least of those
-machines whose config was changed.
+"least_phase_margin_deg"}. A machine without improvement counts as a reduction of 0. Margins are the least over machines
+with a changed config.
 """
 
 import argparse
@@ -24,10 +24,10 @@ from typing import Any
 import numpy as np
 
 KINDS = ("ivu", "ldu", "belt", "arm")
-LONG = 16.0  # s of a recording
+LONG = 16.0  # s, length of a recording
 TRIES = 100
-WORSE = 0.05  # share by which the error may rise
-BETTER = 0.02  # share from which it counts as improved
+WORSE = 0.05  # relative increase of the error that counts as worse
+BETTER = 0.02  # relative reduction of the error that counts as improved
 
 
 def main() -> None:
@@ -56,7 +56,7 @@ def main() -> None:
 
 
 def summary(results: list[dict[str, Any]]) -> dict[str, Any]:
-    """What the benchmark prints."""
+    """Summary that the benchmark prints."""
     cut = np.array([found["reduction"] for found in results])
     margins = [found["margins"] for found in results if found["margins"] is not None]
     return {
@@ -70,7 +70,7 @@ def summary(results: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 def told(found: dict[str, Any]) -> str:
-    """One machine in a line."""
+    """Result of one machine in a line."""
     effect = found["effect"]
     what = f"{found['machine']:5} {effect['term']} at {effect['node']}"
     named = ", ".join(found["named"]) or found["verdict"]
@@ -78,7 +78,7 @@ def told(found: dict[str, Any]) -> str:
 
 
 def one(task: tuple[int, int, str, bool]) -> dict[str, Any]:
-    """Conceal, record, diagnose, improve, and run again; from its file where it is there."""
+    """Result of one machine: conceal, record, diagnose, improve, and run again; read from its file where it exists."""
     seed, k, folder, known = task
     kind = KINDS[k % len(KINDS)]
     place = Path(folder) / f"{kind}-{k:03d}"
@@ -102,7 +102,7 @@ def one(task: tuple[int, int, str, bool]) -> dict[str, Any]:
 
 
 def concealed(kind: str, seed: int) -> tuple[Any, Any, dict[str, Any]]:
-    """The owner's config, the machine as it is, and what is hidden in it."""
+    """Nominal config, config of the true machine, and its concealed effect."""
     from rtctl import machines
     from rtctl.cli.common import load_config
     from rtctl.config.errors import UserError
@@ -136,7 +136,7 @@ def concealed(kind: str, seed: int) -> tuple[Any, Any, dict[str, Any]]:
 
 
 def improved(base: Any, truth: Any, place: Path, known: bool) -> dict[str, Any]:
-    """Improvement by the model that a diagnosis finds, judged on the truth."""
+    """Improvement by the model of a diagnosis, evaluated on the true machine."""
     from rtctl.config.errors import NoAnswer, UserError
     from rtctl.improve import found as model
     from rtctl.improve import played
@@ -177,7 +177,7 @@ def improved(base: Any, truth: Any, place: Path, known: bool) -> dict[str, Any]:
 
 
 def record(base: Any, truth: Any, place: Path) -> None:
-    """A recording of the concealed machine under the owner's law, as the daemon would write it."""
+    """Write a recording of the concealed machine under the nominal law, as the daemon would."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 

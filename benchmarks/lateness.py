@@ -1,15 +1,15 @@
-"""How late our loop wakes, against cyclictest on the same CPU with the same period and priority.
+"""Lateness of the rtctl loop, against cyclictest on the same CPU with the same period and priority.
 
     python benchmarks/lateness.py [--json] [--machine ldu|ivu] [--rate HZ] [--seconds S] [--rounds N]
 
-A round is a window of each, one after the other, so that what the machine does meanwhile falls on all alike:
+A round is one window of each, in sequence, so that other load affects all equally:
 
     ours    rtctl run MACHINE --mode real --link shm: loop on the last CPU, its plant on another
     load    cyclictest, while the same plant runs on that other CPU
-    bare    cyclictest with nothing beside it
+    bare    cyclictest alone
 
-Both sleep with clock_nanosleep(TIMER_ABSTIME) on CLOCK_MONOTONIC and count the time from when they should have woken
-to when they read the clock. The ratio of a round is ours over cyclictest; the result is the median over the rounds.
+Both sleep with clock_nanosleep(TIMER_ABSTIME) on CLOCK_MONOTONIC and measure the time from the due wake-up to the
+reading of the clock. The ratio of a round is rtctl over cyclictest; the result is the median over the rounds.
 """
 
 import argparse
@@ -49,7 +49,7 @@ def rtctl_command() -> tuple[str, ...]:
 
 
 def why_no_realtime() -> str | None:
-    """What keeps this machine from measuring our own loop, in a sentence; None where nothing does."""
+    """Reason why the rtctl loop cannot be measured here, as a sentence; None where it can."""
     if len(os.sched_getaffinity(0)) < 2:
         return "one CPU only: the plant needs another than the loop's"
     try:
@@ -61,7 +61,7 @@ def why_no_realtime() -> str | None:
 
 
 def ours(machine: str, rate: float, link: str, seconds: float, folder: Path) -> dict[str, Any]:
-    """One window of our loop: the JSON of the run."""
+    """Window of the rtctl loop; returns the JSON of the run."""
     out = folder / "bundle"
     shutil.rmtree(out, ignore_errors=True)
     command = (
@@ -78,16 +78,16 @@ def ours(machine: str, rate: float, link: str, seconds: float, folder: Path) -> 
 
 @contextlib.contextmanager
 def plant(machine: str, rate: float, folder: Path) -> Iterator[None]:
-    """The emulator on its own, where it runs beside our loop: on the first CPU."""
+    """Emulator alone on the first CPU, its CPU beside the rtctl loop."""
     command = (
         *rtctl_command(), "plant", str(CONFIGS / f"{machine}.yaml"), "--endpoint", f"ipc://{folder}/plant",
         "--mode", "real", "--set", f"name=bench-{os.getpid()}", "--set", f"loop.rate={rate}",
     )  # fmt: skip
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    os.sched_setaffinity(process.pid, {min(os.sched_getaffinity(0))})  # at once: its threads come later
+    os.sched_setaffinity(process.pid, {min(os.sched_getaffinity(0))})  # before the emulator starts threads
     assert process.stdout is not None and process.stderr is not None
     try:
-        if not process.stdout.readline():  # it says that it listens, once it is compiled
+        if not process.stdout.readline():  # the emulator prints a line when compiled and listening
             raise RuntimeError(f"rtctl plant ended:\n{process.stderr.read()}")
         yield
     finally:
@@ -100,12 +100,12 @@ def plant(machine: str, rate: float, folder: Path) -> Iterator[None]:
 
 
 def cyclictest(rate: float, seconds: float, folder: Path) -> dict[str, float]:
-    """One window of cyclictest on the last CPU: percentiles in us, from a histogram with a bucket per nanosecond."""
+    """Window of cyclictest on the last CPU: percentiles in us, from a histogram with a bucket per nanosecond."""
     return run_cyclictest(rate, seconds, max(os.sched_getaffinity(0)), PRIORITY, folder).percentiles()
 
 
 def percentiles(histogram: dict[str, int], cycles: int) -> dict[str, float]:
-    """Percentiles in us, linear within the bucket that holds them; later than all buckets counts as LONGEST_NS."""
+    """Percentiles in us, linear within their bucket; values beyond all buckets count as LONGEST_NS."""
     told = counted(histogram, cycles).percentiles()
     return {name: told[name] for name in SHARES}
 
@@ -116,12 +116,12 @@ def median_of(values: list[dict[str, float]]) -> dict[str, float]:
 
 
 def ratio(a: list[dict[str, float]], b: list[dict[str, float]]) -> dict[str, float]:
-    """Median over the rounds of ours over theirs."""
+    """Median over the rounds of the ratio a / b."""
     return {n: round(statistics.median(x[n] / y[n] for x, y in zip(a, b, strict=True)), 3) for n in SHARES}
 
 
 def measure(machine: str, rate: float, seconds: float, rounds: int, folder: Path) -> dict[str, Any]:
-    """All windows and what they say."""
+    """Results of all windows."""
     ours(machine, rate, "shm", 0.5, folder)  # compile where needed, outside the windows
     ours(machine, rate, "zmq", 0.5, folder)
     ours_at, load_at, bare_at, ticks, zmq, runs = [], [], [], [], [], []

@@ -1,16 +1,16 @@
-"""Whether the laws of the library are those of the proof's machines: what each leaves, in units of noise.
+"""Test of the library's laws on the proof's machines: residuals in units of noise.
 
     rtctl prove --machines --count 60 --seed S --generate-only --out FOLDER
     python benchmarks/laws.py FOLDER [--json]
 
-A generated recording with one concealed effect is fitted with that effect alone, in each of its forms, and no search.
-What is left is compared with the noise that the generator knows. 1 is a law that is the machine's; far more is a form
-that the library lacks, a reading that is off by a part of a tick, or a fit that does not find its place. A diagnosis
-has to put a false second name there. Recordings in which nothing is concealed are judged by their true numbers, which
-leaves what the simulation itself is off by; what pushes such a machine at random stays in as well.
+A generated recording with one concealed effect is fitted with this effect in each of its forms, without a search. The
+residual is compared with the known noise of the generator. A ratio of 1 means that the law equals that of the machine.
+A much larger ratio means a form missing in the library, a reading off by a part of a tick, or a fit in a local minimum.
+A diagnosis then needs a false second name. Recordings without a concealed effect are evaluated with their true numbers:
+the residual is the error of the simulation and the random force on the machine.
 
-Prints for each case what the description leaves and what the law leaves, of the sensor that is worst; with --json
-{"cases", "median", "p90", "worst"} of the latter.
+Prints for each case the residual of the nominal model and of the law, for the worst sensor; with --json {"cases",
+"median", "p90", "worst"} of the law.
 """
 
 import argparse
@@ -52,8 +52,10 @@ def main() -> None:
 
 
 def judged(bundle: Path, answer: dict[str, Any]) -> tuple[float, float | None, str]:
-    """Noise units that the description leaves, that the concealed law leaves, and what that is; None for a law that is
-    not searched at any element of this machine."""
+    """Residuals in noise units of the nominal model and of the concealed law, and the name of the effect.
+
+    The second residual is None for a law that is not searched at any element of this machine.
+    """
     like, space = together([load(bundle)])
     if answer["kind"] in PLAIN:
         model = space.model(space.start())
@@ -65,7 +67,7 @@ def judged(bundle: Path, answer: dict[str, Any]) -> tuple[float, float | None, s
     best: Fitted | None = None
     for h in hypotheses(like.parts[0].sim, base.model):
         if h.term in effect.get("names_ok", [effect["name"]]) and h.node in effect.get("nodes_ok", [effect["node"]]):
-            for own in (h.start(), np.where(h.start() == 0.0, 1.0, h.start())):  # a limit shows where it acts
+            for own in (h.start(), np.where(h.start() == 0.0, 1.0, h.start())):  # at 1 a limit is active
                 f = refit(like, space.add(h), np.concatenate([base.x, own]))
                 best = f if best is None or f.log_evidence > best.log_evidence else best
     after = None if best is None else left(like, enriched(best).e, answer)
@@ -73,7 +75,7 @@ def judged(bundle: Path, answer: dict[str, Any]) -> tuple[float, float | None, s
 
 
 def left(like: Likelihood, e: np.ndarray, answer: dict[str, Any]) -> float:
-    """Residuals (blocks, sensors), SI, over the noise that the generator knows, of the sensor that is worst."""
+    """Residual over the known noise of the generator, of the worst sensor; `e` (blocks, sensors) in SI."""
     sim, out = like.parts[0].sim, []
     for c, name in enumerate(sim.channels):
         sensor = sim.case.machine.sensors.get(name)

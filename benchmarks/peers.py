@@ -1,19 +1,19 @@
-"""How late our loop wakes and what its tick costs, beside cyclictest and a HAL thread of LinuxCNC.
+"""Lateness and tick cost of the rtctl loop, against cyclictest and a HAL thread of LinuxCNC.
 
     python benchmarks/peers.py [--json] [--rate HZ] [--seconds S] [--rounds N] [--stress]
 
-A round is a window of each, one after the other; the next round goes backwards. All wake at the same rate on the last
-CPU; an emulated LDU runs on the first CPU during all of them:
+A round is one window of each, in sequence; the next round has the reverse order. All wake at the same rate on the last
+CPU; an emulated LDU runs on the first CPU during all windows:
 
     ours         rtctl run ldu --mode real --link shm
     cyclictest   of rt-tests
     hal          hal/law.hal: two `pid` and a `lowpass` in a thread of rtapi_app
-    law          the same law in our own steps, in a bare thread (hal/law.py): its cost only, not its lateness
+    law          the law of `hal` with steps of rtctl in a bare thread (hal/law.py): only its cost
 
---stress loads every CPU with a busy process during all windows, and ours with four viewers and 200 clients besides.
+--stress loads every CPU with a busy process during all windows, and rtctl also with four viewers and 200 clients.
 
-The result is the median over the rounds of ours over theirs. A peer that is not installed is left out; without any
-the program says so and ends with 3. It installs nothing.
+The result is the median over the rounds of rtctl over the peer. A peer that is not installed is left out. Without any
+peer the program reports this and ends with 3. It installs nothing.
 """
 
 import argparse
@@ -49,7 +49,7 @@ PEERS = ("cyclictest", "hal")
 
 
 def cost(counts: np.ndarray, counts_per_ns: float) -> dict[str, float]:
-    """Cost of a tick in ns: the mean of its middle half, since the counter may have coarse steps, and percentiles."""
+    """Cost of a tick in ns: percentiles, and the interquartile mean, as the counter may have coarse steps."""
     ns = np.sort(counts) / counts_per_ns
     middle = ns[len(ns) // 4 : len(ns) - len(ns) // 4]
     return {"middle": round(float(middle.mean()), 2), **{
@@ -58,7 +58,7 @@ def cost(counts: np.ndarray, counts_per_ns: float) -> dict[str, float]:
 
 
 def hal_window(library: Path, rate: float, seconds: float, folder: Path, counts_per_ns: float) -> dict[str, Any]:
-    """Lateness in us, cost of the law and of the whole thread in ns."""
+    """Window of HAL: lateness in us, cost of the law and of the whole thread in ns."""
     window = session.run(library, rate, seconds, folder)
     late = np.flatnonzero(window.wakeups[:LONGEST_NS])
     return {
@@ -70,7 +70,7 @@ def hal_window(library: Path, rate: float, seconds: float, folder: Path, counts_
 
 
 def loaded(rate: float, seconds: float, folder: Path, stress: bool) -> dict[str, Any]:
-    """A window of ours, under stress with viewers and clients."""
+    """Window of rtctl; under stress with viewers and clients."""
     with asked(f"bench-{os.getpid()}") if stress else contextlib.nullcontext():
         return ours(MACHINE, rate, "shm", seconds, folder)
 
@@ -78,7 +78,7 @@ def loaded(rate: float, seconds: float, folder: Path, stress: bool) -> dict[str,
 def measure(
     rate: float, seconds: float, rounds: int, absent: dict[str, str], folder: Path, stress: bool = False
 ) -> dict[str, Any]:
-    """All windows and what they say; a peer that turns out not to run here joins `absent`."""
+    """Results of all windows; a peer that fails to run is added to `absent`."""
     ours(MACHINE, rate, "shm", 0.5, folder)  # compile where needed, outside the windows
     counts_per_ns = law.run(rate, 0.5, PRIORITY)[1]
     library = session.build(folder) if "hal" not in absent else folder
@@ -143,7 +143,7 @@ def median_ratio(a: list[float], b: list[float]) -> float:
 
 
 def report(result: dict[str, Any]) -> str:
-    """The result for a person."""
+    """Result as text."""
     lines = [f"{'lateness, us':34s}" + "".join(f"{n:>9s}" for n in SHARES)]
     for name in ("ours", *PEERS):
         if name in result:
@@ -182,7 +182,7 @@ def main() -> int:
         print(json.dumps({"skipped": reason}) if given.json else f"skipped: {reason}")
         return 3
     with tempfile.TemporaryDirectory(prefix="rtb-", dir="/tmp") as folder:
-        Path(folder).chmod(0o711)  # rtapi_app goes through it as another user
+        Path(folder).chmod(0o711)  # rtapi_app enters it as another user
         with busy() if given.stress else contextlib.nullcontext():
             result = measure(given.rate, given.seconds, given.rounds, absent, Path(folder), given.stress)
     print(json.dumps(result) if given.json else report(result))

@@ -1,7 +1,7 @@
-/* What the two reference programs share: the board, the encoders, the laws and the linear machine.
+/* Common code of the two reference programs: board, encoders, laws and the linear machine.
  *
- * Plain C as one would write it by hand for these machines: structs, loops, doubles, static arrays. It says what
- * the same tick costs without rtctl. Whoever includes it defines NQ, NU, NX and the parameters.
+ * Hand-written C for these machines: structs, loops, doubles, static arrays. It measures the cost of the tick
+ * without rtctl. The including file defines NQ, NU, NX and the parameters.
  */
 
 #include <math.h>
@@ -370,7 +370,7 @@ static int64_t read_counter(struct counter_reader *s, uint32_t codes)
     return s->position;
 }
 
-/* Encoder and LS7084 in x4: floor of the angle in quarter lines, no faster than the one-shot lets through. */
+/* Encoder and LS7084 in x4: floor of the angle in quarter lines, limited to the rate of the one-shot. */
 static int64_t encode(double quarters_per_radian, double highest_rate, struct encoder *s, double theta, double h)
 {
     double x = theta * quarters_per_radian;

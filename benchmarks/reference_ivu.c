@@ -1,4 +1,4 @@
-/* The Image Verification Unit by hand: the tick and the plant of configs/ivu.yaml, nothing that it does not use. */
+/* Image Verification Unit in hand-written C: only the tick and the plant of configs/ivu.yaml. */
 
 #define NQ 5
 #define NU 2
@@ -7,7 +7,7 @@
 
 enum { MOTOR1, REEL1, CAPSTAN, REEL2, MOTOR2 };
 
-/* Named as in rtctl: block_field, plant_block_field; whoever calls fills them in by name. */
+/* Named as in rtctl: block_field, plant_block_field; filled in by name by the caller. */
 #define REALS(X) \
     X(capstan_radians_per_count) X(input1_volts_per_code) X(input2_volts_per_code) X(reel1_low) X(reel1_high) \
     X(reel2_low) X(reel2_high) X(machine_R1) X(machine_R2) X(machine_grow) X(machine_core) \
@@ -92,7 +92,7 @@ static struct {
     struct encoder encoder;
     int64_t counter;
     double R1, R2, J1, J2, T1, T2;
-    int64_t relinearised; /* how often the matrices should have been made anew: must stay 0 here */
+    int64_t relinearised; /* number of required updates of the matrices: must stay 0 here */
 } plant;
 
 static struct inputs in;
@@ -380,7 +380,7 @@ void prepare(const struct parameters *given, const double *Phi_T, const double *
     sample();
 }
 
-/* `ahead` is 1 where outputs leave at the start of the next tick. Returns how often the matrices were out of date. */
+/* `ahead` is 1 where outputs leave at the start of the next tick. Returns how often the matrices were outdated. */
 int64_t run(int64_t ticks, int64_t substeps, double dt, int64_t ahead)
 {
     for (int64_t k = 0; k < ticks; k++) {

@@ -1,4 +1,4 @@
-/* The Linear Drive Unit by hand: the tick and the plant of configs/ldu.yaml, nothing that it does not use. */
+/* Linear Drive Unit in hand-written C: only the tick and the plant of configs/ldu.yaml. */
 
 #define NQ 4
 #define NU 1
@@ -7,7 +7,7 @@
 
 enum { MOTOR, WHEEL, CAPSTAN, ENCODER };
 
-/* Named as in rtctl: block_field, plant_block_field; whoever calls fills them in by name. */
+/* Named as in rtctl: block_field, plant_block_field; filled in by name by the caller. */
 #define REALS(X) \
     X(encoder_radians_per_count) X(scale_metres_per_count) X(machine_R_c) X(machine_amp_per_volt) X(shaper_a) \
     X(shaper_w) X(velocity_a) X(velocity_dt) X(position_gain) X(position_integral) X(position_velocity_gain) \

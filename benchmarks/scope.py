@@ -1,11 +1,11 @@
-"""What the scope's server costs at 10 kHz: its share of a core, frames that reach a viewer, rows that it lost.
+"""Cost of the scope's server at 10 kHz: share of a core, frames that reach a viewer, lost rows.
 
     python benchmarks/scope.py [--json] [--seconds S] [--viewers N] [--live]
 
-A stream of rows of the linear drive goes to the real server over the real socket, paced at 10 kHz by a process of its
-own; with --live the rows are those of `rtctl run ldu` in real time. Each viewer takes every frame at once, as a browser
-that is fast enough does. Case `idle` is a server with nobody looking. The share is CPU time of the server's process
-(user and system) over wall time, after it has started.
+A separate process sends rows of the linear drive at 10 kHz to the real server over the real socket; with --live the
+rows come from `rtctl run ldu` in real time. Each viewer reads every frame at once, as a fast browser does. Case `idle`
+is a server without viewers. The share is CPU time of the server's process (user and system) over wall time, after its
+start.
 """
 
 import argparse
@@ -47,7 +47,7 @@ NAME = "scopebench"
 
 
 class Daemon:
-    """Answers what the scope asks of a daemon."""
+    """Substitute for a daemon that answers the requests of the scope."""
 
     def __init__(self, config: Any):
         self.config, self.machine = config, build(config)
@@ -62,7 +62,7 @@ class Daemon:
 
 
 def stream() -> None:
-    """Rows at 10 kHz, a hundred messages a second, until the process is ended."""
+    """Send rows at 10 kHz in a hundred messages a second until the process ends."""
     daemon = Daemon(load_settings(find("ldu"), CONFIGS["ldu"], [f"name={NAME}"]))
     row = generate.generate(daemon.machine, "shm").row
     context = zmq.Context()
@@ -95,7 +95,7 @@ def process(*command: str) -> Iterator[subprocess.Popen[str]]:
 
 
 def cpu_s(pid: int) -> float:
-    """CPU time of a process so far, s."""
+    """CPU time of a process in s."""
     fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 

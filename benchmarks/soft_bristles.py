@@ -1,12 +1,12 @@
-"""Oscillators whose spring has hysteresis, of which the owner knows mass, damper and spring.
+"""Diagnosis of oscillators with a hysteretic spring; the nominal model has mass, damper and spring.
 
     python benchmarks/soft_bristles.py [--count 8] [--seed 100] [--jobs 2] [--out FOLDER] [--json]
 
-Rubber, wire rope and bolted joints do that: bristles that bend through much of the travel, w' = v / z (1 - |w|^n (g
-sign(v w) + d)). With n = g = 1 and d = 0 it is the law of `friction.presliding` over dry friction; where g + d = 1 it
-slides at last all the same; one kind never slides, which the library has no name for, and one is linear. 12 s at 750 Hz
-in open loop under a smooth multisine, noise of 0.1 % of the travel. Case k of a seed is the same in every run; nothing
-here is shared with plants/ or rtctl/diagnose/.
+Rubber, wire rope and bolted joints have this hysteresis: bristles that bend over much of the travel, w' = v / z (1 -
+|w|^n (g sign(v w) + d)). With n = g = 1 and d = 0 it is the law of `friction.presliding` over dry friction. Where
+g + d = 1 the bristle finally slides. One kind never slides and has no name in the library; one kind is linear. 12 s at
+750 Hz in open loop under a smooth multisine, noise of 0.1 % of the travel. Case k of a seed is reproducible. The
+equations share no code with plants/ or rtctl/diagnose/.
 
 Source: Bouc 1967; Wen, Method for random vibration of hysteretic systems, J. Eng. Mech. 102 (1976); Noel & Schoukens,
 Hysteretic benchmark with a dynamic nonlinearity (2016) for the kind.
@@ -20,15 +20,15 @@ import numpy as np
 from concealed import run, write
 from numba import njit
 
-RATE, FINE, SECONDS, LINES = 750.0, 40, 12.0, 25  # Hz, steps of the integration a sample, s, of the multisine
+RATE, FINE, SECONDS, LINES = 750.0, 40, 12.0, 25  # Hz, integration steps per sample, s, lines of the multisine
 LAW = {"friction.coulomb", "friction.presliding"}
 
 
 class Kind(NamedTuple):
-    """What is in the spring beside what the owner knows."""
+    """Hysteresis of the spring, missing in the nominal model."""
 
-    force: float  # of the rms of the elastic force
-    z: float  # of the travel, after which it slides
+    force: float  # share of the rms of the elastic force
+    z: float  # share of the travel after which it slides
     n: float = 1.0
     g: float = 1.0
     d: float = 0.0
@@ -44,13 +44,13 @@ KINDS = (
     Kind(0.1, 0.1),
     Kind(0.4, 0.1, n=2.0),
     Kind(0.4, 0.1, g=0.7, d=0.3),
-    Kind(0.5, 0.5, g=0.8, d=-1.1, named=0),  # of Noel & Schoukens
+    Kind(0.5, 0.5, g=0.8, d=-1.1, named=0),  # values of Noel & Schoukens
 )
 
 
 @njit
 def moved(m: float, c: float, k: float, F: float, z: float, kind: Kind, u: np.ndarray) -> np.ndarray:
-    """Places (n,) m under the force `u` (n * FINE,) N; `F` in N and `z` in m are those of the bristles."""
+    """Positions (n,) in m under the force `u` (n * FINE,) in N; `F` in N and `z` in m are bristle parameters."""
     x = v = w = 0.0
     shown, h = np.empty(len(u) // FINE), 1.0 / RATE / FINE
     for i in range(len(u)):
@@ -63,7 +63,7 @@ def moved(m: float, c: float, k: float, F: float, z: float, kind: Kind, u: np.nd
 
 
 def conceal(folder: Path, seed: int, number: int) -> Kind:
-    """Write a case as a bundle; what is in it comes back."""
+    """Write a case as a bundle; returns its kind."""
     rng, kind = np.random.default_rng(seed + number), KINDS[number % len(KINDS)]
     m, own = 10 ** rng.uniform(-1, 1), rng.uniform(10, 40)  # kg, Hz
     k = m * (2 * np.pi * own) ** 2
@@ -89,8 +89,10 @@ def conceal(folder: Path, seed: int, number: int) -> Kind:
 
 
 def judged(hidden: dict[str, Kind], out: Path) -> dict[str, Any]:
-    """How many were told rightly: what slides by both names and no third, what never does by none; both names and a
-    third, which is then of the law's form, count apart."""
+    """Number of right diagnoses: sliding kinds with exactly both names, the others without a name.
+
+    Both names with a third name, then of the form of the law, count separately.
+    """
     right, bent, others = 0, 0, {}
     for case, kind in hidden.items():
         told = json.loads((out / case / "diagnosis.json").read_text())
@@ -106,7 +108,7 @@ def judged(hidden: dict[str, Kind], out: Path) -> dict[str, Any]:
 
 
 def told(found: dict[str, Any]) -> list[str]:
-    """Lines of what was found."""
+    """Result as lines of text."""
     return [f"{found['right']} of {found['cases']} right, {found['with_another']} more with another name beside both"]
 
 

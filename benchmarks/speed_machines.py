@@ -1,12 +1,12 @@
-"""Drives without a controller that show a speed and no position, with an effect concealed in some of them.
+"""Diagnosis of open-loop drives with a speed sensor and no position sensor, some with a concealed effect.
 
     python benchmarks/speed_machines.py [--count 48] [--seed 60] [--jobs 2] [--out FOLDER] [--json]
 
-`rtctl prove` conceals effects in machines that are controlled by their position. These are of the other kind, as
-benchmarks of system identification have them: 10 to 20 s at 50 to 1000 Hz of a motor with viscous friction under random
-steps, levels or a multisine, its speed with 0.3 to 1.5 % of noise, the owner's values off by up to 12 %. The equations
-here share nothing with plants/ or rtctl/diagnose/. An effect that other values of mass and friction would take up to
-less than the noise is drawn again. Case k of a seed is the same in every run.
+`rtctl prove` conceals effects in machines under position control. This benchmark has machines as in benchmarks of
+system identification: 10 to 20 s at 50 to 1000 Hz of a motor with viscous friction under random steps, levels or a
+multisine, speed noise of 0.3 to 1.5 %, nominal values off by up to 12 %. The equations share no code with plants/ or
+rtctl/diagnose/. An effect is drawn again where other values of mass and friction reduce its residual below the noise.
+Case k of a seed is reproducible.
 
 Source for the kind: Wigren & Schoukens, Three free data sets for development and benchmarking in nonlinear system
 identification, ECC 2013 (coupled electric drives, whose sensor does not know direction).
@@ -21,16 +21,16 @@ from concealed import run, write
 from numba import njit
 from scipy.optimize import least_squares
 
-STEP = 50e-6  # s, of the integration
+STEP = 50e-6  # s, integration step
 FIT = ("heldout_nrmse_before", "heldout_nrmse_after", "noise_floor")
-OFF = 0.12  # of the owner's values, at most
+OFF = 0.12  # largest relative error of the nominal values
 NAMES = {
     "dry": "friction.coulomb", "dead": "drive.deadband", "unequal": "drive.gain_asymmetry", "offset": "drive.offset",
     "limit": "drive.saturation", "lag": "drive.lag", "delay": "timing.delay", "rings": "structure.resonance",
     "blind": "sensor.rectified", "spring": "load.spring",
 }  # fmt: skip
-FIELDS = {"rings": ("part", "stiff", "damp")}  # of a drive, where they are not called as the effect is
-DRAWS, SHOWS = 20, 1.0  # an effect must leave more than the noise after the best fit without it
+FIELDS = {"rings": ("part", "stiff", "damp")}  # fields of a drive for effects with other names
+DRAWS, SHOWS = 20, 1.0  # most draws, and least residual of the best fit without the effect over noise
 KINDS = (
     (), (), ("dry",), ("dead",), ("unequal",), ("offset",), ("limit",), ("lag",), ("delay",), ("rings",), ("blind",),
     ("spring",), ("blind", "rings"), ("blind", "dry"), (),
@@ -38,7 +38,7 @@ KINDS = (
 
 
 class Drive(NamedTuple):
-    """A motor, what it turns, and what may be there besides; 0 where it is not."""
+    """Motor, load and possible effects; 0 for an absent effect."""
 
     M: float
     F: float
@@ -51,14 +51,14 @@ class Drive(NamedTuple):
     lag: float = 0.0  # s
     delay: float = 0.0  # s
     spring: float = 0.0  # N/m
-    part: float = 0.0  # kg, that swings
-    stiff: float = 0.0  # N/m, that it swings on
+    part: float = 0.0  # kg, mass of the resonance
+    stiff: float = 0.0  # N/m, stiffness of the resonance
     damp: float = 0.0  # N s/m
 
 
 @njit
 def speed_of(d: Drive, u: np.ndarray, dt: float, fine: int) -> np.ndarray:
-    """Speed at each sample (n,) under held volts (n,), in `fine` steps a sample: semi-implicit Euler."""
+    """Speed (n,) at each sample under held volts (n,), by semi-implicit Euler with `fine` steps per sample."""
     out, h, late = np.zeros(len(u)), dt / fine, round(d.delay / dt * fine)
     x = v = y = w = a = 0.0
     for k in range(len(u)):
@@ -79,7 +79,7 @@ def speed_of(d: Drive, u: np.ndarray, dt: float, fine: int) -> np.ndarray:
 
 
 def volts(rng: np.random.Generator, t: np.ndarray) -> np.ndarray:
-    """Random signs, random levels, or a sum of sines."""
+    """Voltages (n,): random signs, random levels, or a multisine."""
     n, rate = len(t), 1.0 / (t[1] - t[0])
     kind = rng.integers(3)
     if kind == 2:
@@ -91,7 +91,7 @@ def volts(rng: np.random.Generator, t: np.ndarray) -> np.ndarray:
 
 
 def drawn(rng: np.random.Generator, what: tuple[str, ...], u: np.ndarray, rate: float) -> Drive:
-    """A drive with these effects, sized by its command and its time constant."""
+    """Drive with these effects, scaled by its command and its time constant."""
     slow, M = rng.uniform(0.1, 0.6), rng.uniform(0.5, 3.0)
     d, rms = Drive(M, M / slow, rng.uniform(0.5, 3.0) * M / slow), float(np.std(u))
     part = rng.uniform(0.2, 0.7) * M
@@ -107,7 +107,7 @@ def drawn(rng: np.random.Generator, what: tuple[str, ...], u: np.ndarray, rate: 
 
 
 def left(d: Drive, name: str, u: np.ndarray, v: np.ndarray, rate: float) -> float:
-    """Rms error of the best drive without one of the effects: what its mass, friction and gain can be, it is not."""
+    """Rms residual of the best drive without effect `name`, over mass, friction and gain."""
     none = d if name == "blind" else d._replace(**{f: Drive._field_defaults[f] for f in FIELDS.get(name, (name,))})
     blind = name != "blind" and v.min() >= 0.0
 
@@ -120,7 +120,7 @@ def left(d: Drive, name: str, u: np.ndarray, v: np.ndarray, rate: float) -> floa
 
 
 def conceal(folder: Path, seed: int, k: int) -> tuple[str, ...]:
-    """Write case k as a bundle; what is in it comes back."""
+    """Write case k as a bundle; returns its effects."""
     rng, what = np.random.default_rng([seed, k]), KINDS[k % len(KINDS)]
     for _ in range(DRAWS):
         rate = float(rng.choice([50.0, 100.0, 200.0, 1000.0]))
@@ -142,7 +142,7 @@ def conceal(folder: Path, seed: int, k: int) -> tuple[str, ...]:
 
 
 def judged(hidden: dict[str, tuple[str, ...]], out: Path) -> dict[str, Any]:
-    """How many were told rightly; a verdict `ambiguous` that has the right names among others counts apart."""
+    """Number of right diagnoses; `ambiguous` with the right names among others counts separately."""
     right, among, names, alarms, gaps, wrong = 0, 0, [], 0, [], {}
     for case, true in hidden.items():
         told = json.loads((out / case / "diagnosis.json").read_text())
@@ -164,7 +164,7 @@ def judged(hidden: dict[str, tuple[str, ...]], out: Path) -> dict[str, Any]:
 
 
 def told(found: dict[str, Any]) -> list[str]:
-    """Lines of what was found."""
+    """Result as lines of text."""
     return [
         f"{found['right']} of {found['cases']} right, {found['ambiguous_with_it']} more ambiguous with the right names",
         f"false alarms {found['false_alarms']} of {found['nothing_missing']}",

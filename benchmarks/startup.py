@@ -2,11 +2,11 @@
 
     python benchmarks/startup.py [--json] [--machine ivu|ldu] [--repeats N] [--cold]
 
-The clock is read before the process is started. The loop writes the time of its first tick into the machine's shared
-segment (`first_ns` of its status), from the same clock, CLOCK_MONOTONIC, and this program reads it there.
-So the time has all in it: Python's imports, the config, compiled code from the cache, plant and loop as processes of
-their own, and the hello of the link. `--cold` starts once more with an empty RTCTL_CACHE_DIR, so that the tick and the
-plant are compiled first, and over the other link twice: with an empty one too, and with the steps that the first left.
+CLOCK_MONOTONIC is read before the start of the process. The loop writes the time of its first tick by this clock into
+the machine's shared segment (`first_ns` of its status), and this program reads it there. The time includes Python's
+imports, the config, compiled code from the cache, start of the plant and loop processes, and the handshake of the link.
+`--cold` also starts with an empty RTCTL_CACHE_DIR, which includes compilation of tick and plant. It then starts over
+the other link twice: with an empty cache, and with the compiled steps of the first run.
 """
 
 import argparse
@@ -29,7 +29,7 @@ LIMIT = 300.0  # s
 
 
 def start(machine: str, link: str, folder: Path, cache: Path | None) -> float:
-    """Seconds to the first tick of a short run. Raises RuntimeError where none comes."""
+    """Time in s to the first tick of a short run. Raises RuntimeError without a tick."""
     name = f"start-{os.getpid()}"
     segment = Path("/dev/shm") / f"rtctl-{os.getuid()}-{name}"
     command = (
@@ -52,7 +52,7 @@ def start(machine: str, link: str, folder: Path, cache: Path | None) -> float:
 
 
 def first_tick(path: Path) -> int:
-    """Clock at the first tick in ns; 0 where it has not come yet."""
+    """Clock at the first tick in ns; 0 before it."""
     try:
         with path.open("rb") as file:
             data = file.read(STATUS.itemsize)  # the status is the first record of the segment
@@ -81,7 +81,7 @@ def main() -> int:
         if given.cold:
             cache, empty = Path(folder) / "cache", Path(folder) / "empty"
             result["cold_s"] = round(start(given.machine, given.link, Path(folder), cache), 2)
-            other = "shm" if given.link == "zmq" else "zmq"  # another tick, of nearly the same steps
+            other = "shm" if given.link == "zmq" else "zmq"  # another tick with nearly the same steps
             alone, after = (start(given.machine, other, Path(folder), each) for each in (empty, cache))
             result["another_cold_s"], result["another_after_first_s"] = round(alone, 2), round(after, 2)
             result["another_ratio"] = round(after / alone, 2)

@@ -1,8 +1,8 @@
-"""Load beside a loop: a busy process on every CPU, viewers of its rows, and clients that ask.
+"""Load beside a loop: a busy process on every CPU, viewers of its rows, and clients with requests.
 
     python benchmarks/stress.py NAME [--viewers N] [--clients N]     until it is stopped
 
-`busy()` is the load that anything measured here can have beside it; `asked(NAME)` is what a daemon alone can have.
+`busy()` is load for any benchmark; `asked(NAME)` is load for a daemon.
 """
 
 import argparse
@@ -15,27 +15,27 @@ import time
 from collections.abc import Iterator
 
 VIEWERS, CLIENTS = 4, 200
-PERIOD = 1.0  # s, in which every client asks once
+PERIOD = 1.0  # s, interval between requests of a client
 SPIN = "while True: pass"
 
 
 @contextlib.contextmanager
 def busy() -> Iterator[None]:
-    """A process of usual priority that computes on every CPU."""
+    """Busy process of usual priority on every CPU."""
     with ended([[sys.executable, "-c", SPIN] for _ in os.sched_getaffinity(0)]):
         yield
 
 
 @contextlib.contextmanager
 def asked(name: str) -> Iterator[None]:
-    """Viewers and clients of the machine `name`, from when it answers."""
+    """Viewers and clients of the machine `name`, started when it answers."""
     with ended([[sys.executable, __file__, name]]):
         yield
 
 
 @contextlib.contextmanager
 def ended(commands: list[list[str]]) -> Iterator[None]:
-    """Processes that end with the block."""
+    """Run commands as processes that end with the block."""
     running = [subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) for command in commands]
     try:
         yield
@@ -47,7 +47,7 @@ def ended(commands: list[list[str]]) -> Iterator[None]:
 
 
 def main() -> None:
-    """Viewers that read all that comes, and clients that ask for the status in turn."""
+    """Run viewers that read all rows, and clients that request the status in turn."""
     import zmq
 
     from rtctl.config.errors import UserError

@@ -1,11 +1,11 @@
-"""How long a trend takes, and how it scales: recordings of an axis whose friction grows, on 1 and on 2 Dask workers.
+"""Duration and scaling of a trend: recordings of an axis with growing friction, on 1 and on 2 Dask workers.
 
     python benchmarks/trend.py [--json] [--records N] [--scaled N] [--seconds T]
 
-Wall time is of `rtctl trend` with a process for each CPU. The workers are compared in turns on the first N recordings,
-each warm. On a busy machine wall times say who else was there, so CPU times are told as well: W of the workers, S of
-scheduler and client, which take turns with them on two CPUs. `dask_speedup_by_cpu` is 2 W / (W + S), what two CPUs that
-have nothing else to do would come to.
+Wall time is that of `rtctl trend` with a process for each CPU. Clusters of 1 and 2 warm workers alternate on the first
+N recordings. Wall time depends on other load. Therefore CPU times are also reported: W of the workers, S of scheduler
+and client, which share two CPUs with the workers. `dask_speedup_by_cpu` is 2 W / (W + S), the speed-up on two otherwise
+idle CPUs.
 """
 
 import argparse
@@ -35,7 +35,7 @@ MASS, VISCOUS, DRY = 95.0, 200.0, 20.0  # kg, Ns/m, N
 
 @numba.njit(cache=True)
 def carriage(force: np.ndarray, dt: float, mass: float, viscous: float, dry: float) -> np.ndarray:
-    """Positions (n,), m, of a carriage with dry friction under a force (n,), N, in 4 substeps a tick."""
+    """Positions (n,) in m of a carriage with dry friction under a force (n,) in N, with 4 substeps per tick."""
     x, v = 0.0, 0.0
     out = np.empty(len(force))
     h = dt / 4
@@ -50,7 +50,7 @@ def carriage(force: np.ndarray, dt: float, mass: float, viscous: float, dry: flo
 
 
 def record(folder: Path, number: int, records: int, seconds: float) -> None:
-    """A bundle of the carriage, whose dry friction grows by 30 % from two thirds of the records on."""
+    """Write a bundle of the carriage; its dry friction grows by 30 % after two thirds of the records."""
     rng = np.random.default_rng(number)
     n = int(seconds * RATE)
     t = np.arange(n) / RATE
@@ -74,7 +74,7 @@ def record(folder: Path, number: int, records: int, seconds: float) -> None:
 
 
 def everywhere(cluster: Any, function: Any, *arguments: Any) -> list[Any]:
-    """What a function returns in each worker."""
+    """Results of a function in each worker."""
     from distributed import Client
 
     with Client(cluster) as client:
@@ -82,7 +82,7 @@ def everywhere(cluster: Any, function: Any, *arguments: Any) -> list[Any]:
 
 
 def scaled(pieces: list[Piece], windows: int) -> dict[str, Any]:
-    """Wall and CPU times of clusters of 1 and of 2 workers, in turns, and whether their rows are the same."""
+    """Wall and CPU times of clusters of 1 and of 2 workers, alternately, and whether their rows are equal."""
     from distributed import LocalCluster
 
     clusters = {n: LocalCluster(n_workers=n, threads_per_worker=1, dashboard_address=None) for n in WORKERS}
@@ -118,7 +118,7 @@ def scaled(pieces: list[Piece], windows: int) -> dict[str, Any]:
 
 
 def measure(records: int, some: int, seconds: float, windows: int) -> dict[str, Any]:
-    """All figures, on recordings that are made and deleted here."""
+    """All results, on temporary recordings."""
     folder = Path(tempfile.mkdtemp(prefix="rtctl-trend-"))
     try:
         for number in range(records):

@@ -1,4 +1,4 @@
-"""False alarms of `rtctl trend` on stationary series, and the shifts that it finds: simulated series of 40 estimates.
+"""False alarms of `rtctl trend` on stationary series, and detection of shifts, on simulated series of 40 estimates.
 
 python benchmarks/trend_alarms.py [--json] [--series N] [--length N]
 """
@@ -14,11 +14,11 @@ from rtctl.trend.change_points import changes
 
 STATIONARY = {"white": (0.0, np.inf), "t3": (0.0, 3.0), "ar_0.5": (0.5, np.inf), "ar_0.9": (0.9, np.inf),
               "ar_0.95": (0.95, np.inf)}  # fmt: skip
-SHIFTS = (2.0, 3.0, 4.0, 6.0)  # scatters of a record
+SHIFTS = (2.0, 3.0, 4.0, 6.0)  # shifts in standard deviations of an estimate
 
 
 def stationary(rng: np.random.Generator, n: int, phi: float, dof: float) -> np.ndarray:
-    """A stationary autoregression (n,) of variance one (of its normal form)."""
+    """Stationary autoregression (n,) with unit variance in the Gaussian case."""
     e = rng.standard_normal(n) if np.isinf(dof) else rng.standard_t(dof, n)
     x = e.copy()
     for k in range(1, n):
@@ -27,7 +27,7 @@ def stationary(rng: np.random.Generator, n: int, phi: float, dof: float) -> np.n
 
 
 def measure(series: int, n: int) -> dict[str, Any]:
-    """Alarms of stationary series, and shares of shifts that are found."""
+    """Alarms on stationary series, and shares of detected shifts."""
     rng = np.random.default_rng(0)
     at, where = np.arange(float(n)), 5 * n // 8
 

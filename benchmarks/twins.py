@@ -1,4 +1,4 @@
-"""The same machine twice: as rtctl compiles it, and as hand-written C, both on virtual time in this process."""
+"""One machine compiled by rtctl and as hand-written C, both on virtual time in this process."""
 
 import ctypes
 import subprocess
@@ -28,18 +28,18 @@ def machine_of(kind: str) -> machines.Machine:
 
 
 class Ours:
-    """The generated loop, run as the daemon's loop process runs it, on plain arrays instead of a shared segment."""
+    """Generated loop, run as in the daemon's loop process, but on plain arrays instead of a shared segment."""
 
     def __init__(self, machine: machines.Machine):
         self.machine, self.made = machine, generate.generate(machine, "shm")
-        length = max(int(machine.config.record.seconds * machine.rate), 1000)  # of the ring, as the supervisor makes it
+        length = max(int(machine.config.record.seconds * machine.rate), 1000)  # of the ring, as in the supervisor
         self.segment = fused.segment(self.made, length)
         self.rows = self.segment["rows"]
         self.reset()
         self.loop.warm()
 
     def reset(self) -> None:
-        """Everything at rest again, armed and playing from the first tick on."""
+        """Reset to rest; armed, with the reference from the first tick."""
         for name, array in self.segment.items():
             if name != "rows":
                 array[...] = np.zeros((), array.dtype)
@@ -58,7 +58,7 @@ def _arm_and_play(_: Any, command: Any) -> None:
 
 
 class Reference:
-    """The C program for the same machine: same parameters, same matrices, same row, its own code."""
+    """C program of the machine, with equal parameters, matrices and row."""
 
     def __init__(
         self, machine: machines.Machine, row: np.dtype, rows: int, folder: Path, flags: tuple[str, ...] = ("-O2",)
@@ -89,7 +89,7 @@ class Reference:
         return text.decode().split()
 
     def _check_row(self, row: np.dtype) -> None:
-        """The C struct has the columns of the trace in their order; a new column must be added there too."""
+        """Raise RuntimeError where the C struct differs from the columns of the trace; add new columns there, too."""
         text = (HERE / f"reference_{self.machine.kind}.c").read_text()
         body = text[text.index("struct row {") :].split("}")[0].replace("\n", " ")
         written = [name for part in body.split("{")[1].split(";") for name in part.replace(",", " ").split()[1:]]
@@ -99,14 +99,14 @@ class Reference:
             )
 
     def reset(self) -> None:
-        """Everything at rest again."""
+        """Reset to rest."""
         pointers = (*self._matrices, *self._tables, self.rows)
         self._library.prepare(
             self._parameters, *(ctypes.c_void_p(a.ctypes.data) for a in pointers), ctypes.c_int64(len(self.rows))
         )
 
     def run(self, ticks: int) -> None:
-        """Run from rest. Raises RuntimeError where the plant would have made its matrices anew: C does not."""
+        """Run from rest. Raises RuntimeError where the plant would have updated its matrices: C does not."""
         machine = self.machine
         period = round(1e9 / machine.rate) * 1e-9
         ahead = int(machine.config.loop.write == "next_tick")
@@ -115,7 +115,7 @@ class Reference:
 
 
 def _values(machine: machines.Machine) -> dict[str, float]:
-    """Every number of the diagrams by the name that C gives it: block_field, and plant_block_field."""
+    """Numbers of the diagrams by their names in C: block_field, and plant_block_field."""
     out: dict[str, float] = {}
     for prefix, blocks in (("", machine.diagram.blocks), ("plant_", machine.plant_diagram.blocks)):
         for block in blocks:
@@ -133,7 +133,7 @@ def _collect(out: dict[str, float], prefix: str, params: Any) -> None:
 
 
 def _matrices(machine: machines.Machine) -> tuple[np.ndarray, np.ndarray]:
-    """Phi and Gamma of one substep, from the plant's own equations."""
+    """Matrices Phi and Gamma of one substep, from the equations of the plant."""
     plant = next(b for b in machine.plant_diagram.blocks if b.name == "plant")
     p, s = plant.params.graph, np.zeros(1, GRAPH_STATE)[0]
     graph.start(p, s)

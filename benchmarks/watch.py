@@ -1,16 +1,16 @@
-"""The model beside a running machine (`rtctl watch`): false alarms, what it notices, what it costs.
+"""Monitoring of a running machine (`rtctl watch`): false alarms, detection rate, and cost.
 
     python benchmarks/watch.py [--json] [--machine ivu|ldu] [--days N] [--trials N] [--learn S] [--rounds N]
 
-false_alarms_per_day   simulated days of eight hours on virtual time, each with random moves of its own and a band that
-                       was learned from moves before it
-noticed_share          concealed effects of usual size (as `rtctl plant --conceal SEED` draws them, seeds from 0), each
-                       of which begins in mid-run: the share that is noticed within 30 s of motion; median_delay_s is
-                       the motion that those took
-core_share_500hz       processor time of reading rows, judging and reporting, over the time that they cover, in pieces
-core_share_10khz       of 0.25 s as the live watch takes them
-lateness_ratio         p99 lateness of a loop in real mode with a watch and a diagnosis beside it over that without, the
-                       median of rounds; null where it is not measured (--rounds 0)
+false_alarms_per_day   simulated days of eight hours on virtual time, with independent random moves and a band learned
+                       from moves before
+noticed_share          concealed effects of usual size (drawn as by `rtctl plant --conceal SEED`, seeds from 0) that
+                       begin in mid-run: the share noticed within 30 s of motion; median_delay_s is the motion until
+                       the alarm
+core_share_500hz       CPU time of reading rows, testing and reporting over the time of the rows, in pieces of 0.25 s
+core_share_10khz       as in the live watch
+lateness_ratio         p99 lateness of a loop in real mode with a watch and a diagnosis over that without, median of
+                       rounds; null where it is not measured (--rounds 0)
 """
 
 import argparse
@@ -36,17 +36,17 @@ from rtctl.watch.rehearsal import Moves, Shift, usual
 from rtctl.watch.report import report
 
 DAY = 8 * 3600.0  # s
-PIECE = 300.0  # s of a day at a time: what is held in memory
-HEALTHY = 20.0  # s before an effect begins
-WITHIN = 30.0  # s of motion
-SHOWN = 1.0  # counts rms: least change of a sensor by an effect that the motion shows
-WATCHED = 90.0  # s that a trial lasts at most
-TURN = 0.25  # s of rows at a time, as the live watch takes them
-SEED = 20250614  # of learning and days; trials add their number
+PIECE = 300.0  # s of a day held in memory at a time
+HEALTHY = 20.0  # s before the start of an effect
+WITHIN = 30.0  # s of motion until an alarm counts as missed
+SHOWN = 1.0  # counts rms: least change of a sensor by a visible effect
+WATCHED = 90.0  # s, longest trial
+TURN = 0.25  # s of rows at a time, as in the live watch
+SEED = 20250614  # seed of learning and days; trials add their number
 
 
 def learned(config: Any, moves: Moves, seed: int, seconds: float) -> tuple[Shift, np.random.Generator, Monitor]:
-    """A shift whose monitor has learned its band."""
+    """Shift, random generator and monitor with a learned band."""
     shift, rng = Shift(config), np.random.default_rng([SEED, seed])
     monitor = Monitor(shift.case, seconds=seconds)
     while monitor.band is None:
@@ -58,7 +58,7 @@ def learned(config: Any, moves: Moves, seed: int, seconds: float) -> tuple[Shift
 
 
 def days(config: Any, moves: Moves, numbers: range, seconds: float, say: Any) -> list[dict[str, Any]]:
-    """Alarms of each simulated day, and how many windows were judged."""
+    """Alarms and number of tested windows of each simulated day."""
     out = []
     for day in numbers:
         shift, rng, monitor = learned(config, moves, day, seconds)
@@ -73,7 +73,7 @@ def days(config: Any, moves: Moves, numbers: range, seconds: float, say: Any) ->
 
 
 def trial(config: Any, moves: Moves, band: Band, seed: int) -> dict[str, Any]:
-    """An effect that begins in mid-run, and when it is noticed."""
+    """Trial of an effect that begins in mid-run: the effect and the time of its alarm."""
     hidden, entry = conceal(config, seed)
     shift, rng = Shift(config), np.random.default_rng([SEED, 1000, seed])
     monitor = Monitor(shift.case, band=band)
@@ -106,7 +106,7 @@ def moved(healthy: Shift, hidden: Shift, moves: Moves, rng: np.random.Generator)
 
 
 def share(config: Any, moves: Moves, seconds: float) -> float:
-    """Processor time of a monitor over the time that its rows cover, as the live watch runs it."""
+    """CPU time of a monitor over the time of its rows, run as in the live watch."""
     shift, rng, monitor = learned(config, moves, 0, 120.0)
     rows = shift.play(moves, rng, seconds)
     rows = rows[rows["tick"] >= 0]
@@ -120,7 +120,7 @@ def share(config: Any, moves: Moves, seconds: float) -> float:
 
 
 def lateness(rounds: int, seconds: float) -> float:
-    """p99 lateness of a loop with a watch and a diagnosis beside it over that without, the median of rounds."""
+    """Ratio of p99 lateness of a loop with a watch and a diagnosis to that without, median of rounds."""
     rtctl = str(Path(sys.executable).parent / "rtctl")
     ratios = []
     with tempfile.TemporaryDirectory() as folder:
@@ -197,7 +197,7 @@ def main() -> None:
         "noticed_share": sum(t["noticed"] for t in tried) / len(tried) if tried else None,
         "median_delay_s": statistics.median(delays) if delays else None,
         "core_share_500hz": share(slow, usual(slow), 120.0),
-        "core_share_10khz": share(fast, usual(fast)._replace(jumps=0.0), 30.0),  # a jump of 20 mm trips it
+        "core_share_10khz": share(fast, usual(fast)._replace(jumps=0.0), 30.0),  # a 20 mm jump trips the machine
         "lateness_ratio": lateness(given.rounds, 20.0) if given.rounds else None,
         "machine": given.machine, "days": len(per_day), "trials": len(tried),
     }  # fmt: skip

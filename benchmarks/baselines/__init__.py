@@ -1,1 +1,1 @@
-"""What others would do with the same recordings: simple ways to find missing physics, in the same exchange form."""
+"""Baseline methods that find missing physics in a recording, with the output format of `rtctl diagnose`."""

@@ -1,4 +1,4 @@
-"""diagnosis.json as a baseline writes it."""
+"""diagnosis.json of a baseline."""
 
 from typing import Any
 
@@ -12,7 +12,7 @@ AXES = {
     "geometry.radius_change": "position",
 }  # fmt: skip
 MAIN = {"ivu": "capstan_counts", "ldu": "encoder_counts", "axis": "x"}
-NODES = {  # where a method with one equation puts a family of effects
+NODES = {  # node of a family of effects for methods with one equation
     "ivu": {"friction": "motor1", "drive": "drive1", "ripple": "motor1", "load": "capstan", "timing": "loop",
             "geometry": "reel1", "transmission": "capstan"},
     "ldu": {"friction": "motor", "drive": "drive", "ripple": "motor", "load": "carriage", "timing": "loop",
@@ -23,12 +23,12 @@ NODES = {  # where a method with one equation puts a family of effects
 
 
 def node_of(plant: str, name: str) -> str:
-    """Node that goes with a name."""
+    """Node of an effect name."""
     return "reel1" if name == "ripple.reel" else NODES[plant].get(name.partition(".")[0], "loop")
 
 
 def diagnosis(plant: str, names: list[str], unnamed: bool = False, confidence: float = 0.9) -> dict[str, Any]:
-    """Verdict `named` with these names; without any `unnamed` or `nothing`."""
+    """Diagnosis with verdict `named` and these names; without names, `unnamed` or `nothing`."""
     verdict = "named" if names else "unnamed" if unnamed else "nothing"
     located = None
     if names or unnamed:

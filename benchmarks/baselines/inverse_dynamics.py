@@ -1,10 +1,10 @@
-"""Inverse dynamics: effort, inertia, what the owner knows, and regressors chosen forward by BIC.
+"""Inverse dynamics: regression on effort, the nominal model, and regressors by forward selection with BIC.
 
-The acceleration stands on the left, since it carries the noise: with the effort there, every function of the effort
-would explain it.
+The acceleration is the dependent variable, since it has the noise: as dependent variable, the effort would be explained
+by any function of the effort.
 
-The usual library of regressors, each with the name it stands for; a shape (a speed, a band, a place) is tried on a
-grid and costs one parameter more.
+The library has the usual regressors with their effect names. A shape parameter (a speed, a band, a position) is tried
+on a grid and counts as one parameter.
 
 Source: Gautier (1997) for the regression; Schwarz, Annals of Statistics 6 (1978) for BIC.
 """
@@ -17,8 +17,8 @@ from baselines.form import diagnosis
 from baselines.states import States, states
 from rtctl.diagnose.record.format1 import Record
 
-MOST = 3  # effects
-GAIN = 10.0  # of BIC: very strong evidence (Kass & Raftery 1995)
+MOST = 3  # most effects
+GAIN = 10.0  # least decrease of BIC: very strong evidence (Kass & Raftery 1995)
 
 
 class Regressor(NamedTuple):
@@ -26,23 +26,23 @@ class Regressor(NamedTuple):
 
     name: str
     X: np.ndarray
-    shapes: int = 0  # values taken from a grid
+    shapes: int = 0  # number of grid parameters
 
 
 def bic(rss: float, n: int, k: int) -> float:
-    """Schwarz's criterion for k parameters and Gaussian errors."""
+    """Bayesian information criterion for k parameters and Gaussian errors."""
     return float(n * np.log(max(rss, 1e-300) / n) + k * np.log(n))
 
 
 def residual(X: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """y less its projection on the columns of X, whatever their scale."""
+    """Residual (n,) of y after projection on the columns of X, independent of their scale."""
     X = X / np.maximum(np.linalg.norm(X, axis=0), 1e-300)
     found: np.ndarray = y - X @ np.linalg.lstsq(X, y, rcond=1e-10)[0]
     return found
 
 
 def forward(y: np.ndarray, base: np.ndarray, library: list[Regressor], most: int = MOST) -> list[Regressor]:
-    """Regressors in the order in which they lower BIC most, while it falls by more than GAIN."""
+    """Forward selection: regressors by decreasing effect on BIC, while BIC falls by more than GAIN."""
     chosen: list[Regressor] = []
     X, shapes = base, 0
     e = residual(X, y)
@@ -64,7 +64,7 @@ def forward(y: np.ndarray, base: np.ndarray, library: list[Regressor], most: int
 
 
 def base_columns(s: States) -> np.ndarray:
-    """What the owner's own model has: effort over inertia, and friction and spring where it has them."""
+    """Columns (n, k) of the nominal model: effort over inertia, friction and spring where described."""
     columns = [s.effort]
     if s.has_viscous:
         columns.append(s.v)
@@ -76,7 +76,7 @@ def base_columns(s: States) -> np.ndarray:
 
 
 def play(x: np.ndarray, width: float) -> np.ndarray:
-    """Output of the play operator: it follows x at a distance of at most half the width."""
+    """Output (n,) of the play operator with `width`: it follows x at most half the width away."""
     out = np.empty_like(x)
     z = x[0]
     for k, now in enumerate(x):
@@ -86,7 +86,7 @@ def play(x: np.ndarray, width: float) -> np.ndarray:
 
 
 def regressors(s: States) -> list[Regressor]:
-    """The library for one recording."""
+    """Regressor library for one recording."""
     one, dry, fast = np.ones_like(s.v), np.sign(s.v), float(np.sqrt(np.mean(s.v**2))) + 1e-300
     top, span = float(np.abs(s.u).max()) + 1e-300, float(np.ptp(s.x)) + 1e-300
     effort = s.effort
@@ -96,7 +96,7 @@ def regressors(s: States) -> list[Regressor]:
         Regressor("friction.asymmetry", np.abs(s.v)[:, None]),
         Regressor("friction.load", (s.pull * dry)[:, None]),
         Regressor("drive.thermal", (effort * s.t)[:, None]),
-        Regressor("timing.delay", (s.earlier - effort)[:, None]),  # much the same as a lag, seen through the smoothing
+        Regressor("timing.delay", (s.earlier - effort)[:, None]),  # nearly a lag after the smoothing
         Regressor("", (s.v * np.abs(s.v))[:, None]),
         Regressor("", (s.x**2)[:, None]),
     ]
@@ -136,7 +136,7 @@ def regressors(s: States) -> list[Regressor]:
 
 
 def diagnose(record: Record) -> dict[str, Any]:
-    """Names of the regressors that BIC takes."""
+    """Diagnosis with the names of the regressors selected by BIC."""
     s = states(record)
     chosen = forward(s.a, base_columns(s), regressors(s))
     names = list(dict.fromkeys(r.name for r in chosen if r.name))

@@ -1,7 +1,7 @@
 """PySINDy on smoothed states: acceleration as a sparse sum of candidate functions of position, speed and command.
 
-PySINDy is no dependency of rtctl; without it this baseline is left out. Functions that the owner's model has (mass,
-its own friction) count as known; the largest others give the names.
+PySINDy is no dependency of rtctl; without it this baseline is left out. Functions of the nominal model (mass, described
+friction) count as known. The largest other functions give the names.
 
 Source: Brunton, Proctor & Kutz, PNAS 113 (2016); Kaptanoglu et al., PySINDy, JOSS 7 (2022).
 """
@@ -16,7 +16,7 @@ from baselines.form import diagnosis
 from baselines.states import States, states
 from rtctl.diagnose.record.format1 import Record
 
-THRESHOLD = 0.02  # of a coefficient, all columns and the acceleration scaled to unit rms
+THRESHOLD = 0.02  # least coefficient, with columns and acceleration scaled to unit rms
 NAMES = {
     "1": "drive.offset", "v": "friction.viscous", "sign(v)": "friction.coulomb", "|v|": "friction.asymmetry",
     "x": "load.spring", "|u|": "drive.gain_asymmetry", "u^2": "drive.gain_asymmetry", "cos(x)": "load.imbalance",
@@ -45,7 +45,7 @@ def library(s: States) -> dict[str, np.ndarray]:
 
 
 def known(s: States) -> set[str]:
-    """Functions that the owner's own model has."""
+    """Names of the functions in the nominal model."""
     out = {"u"}
     out |= {"v"} if s.has_viscous else set()
     out |= {"sign(v)"} if s.has_coulomb else set()
@@ -53,7 +53,7 @@ def known(s: States) -> set[str]:
 
 
 def diagnose(record: Record) -> dict[str, Any]:
-    """Names of the largest functions that sparse regression keeps beside the owner's."""
+    """Diagnosis with the names of the largest functions kept by sparse regression and missing in the nominal model."""
     import pysindy
 
     s = states(record)
@@ -65,9 +65,9 @@ def diagnose(record: Record) -> dict[str, Any]:
         model = pysindy.SINDy(
             optimizer=pysindy.STLSQ(threshold=THRESHOLD, alpha=1e-3), feature_library=pysindy.IdentityLibrary()
         )
-        # the columns stand as inputs beside the one state, whose derivative is the acceleration
+        # columns are inputs; the derivative of the only state is the acceleration
         model.fit(s.v[:, None] / _rms(s.v), t=1.0, x_dot=target, u=columns)
-    weights = np.abs(np.asarray(model.coefficients())[0])[1:]  # the first is the state itself
+    weights = np.abs(np.asarray(model.coefficients())[0])[1:]  # without the state itself
     found = [name for name, w in sorted(zip(functions, weights, strict=True), key=lambda p: -p[1]) if w > 0.0]
     left = [name for name in found if name not in known(s)]
     names = list(dict.fromkeys(NAMES[name] for name in left if name in NAMES))

@@ -1,7 +1,7 @@
 """Smoothed position, speed, acceleration and effort of a recording, as inverse dynamics needs them.
 
 Source: Savitzky & Golay, Analytical Chemistry 36 (1964); Gautier, Dynamic identification of robots with power model,
-ICRA (1997), for filtering both sides of the equation alike and thinning them out afterwards.
+ICRA (1997), for equal filters on both sides of the equation and decimation afterwards.
 """
 
 from typing import NamedTuple
@@ -15,37 +15,37 @@ from rtctl.diagnose.record.law_params import per_unit
 
 WINDOW = {"ivu": 31, "ldu": 101, "axis": 41}  # rows
 ORDER = 3
-REST = 0.02  # of the highest speed: below it the direction is not sure
+REST = 0.02  # share of the highest speed: below it the direction is uncertain
 
 
 class States(NamedTuple):
-    """Thinned rows (n,) in SI."""
+    """Decimated states (n,) in SI."""
 
     t: np.ndarray
     x: np.ndarray  # capstan angle (ivu), carriage (ldu, axis)
     v: np.ndarray
     a: np.ndarray
-    effort: np.ndarray  # that turns the capstan, of both motors together, Nm (ivu), or moves the carriage, N
-    pull: np.ndarray  # sum of the sizes of all motors' efforts, in the same unit
+    effort: np.ndarray  # total effort at the capstan, Nm (ivu), or at the carriage, N
+    pull: np.ndarray  # sum of the absolute efforts of all motors, in the unit of `effort`
     u: np.ndarray  # command of the first drive, V
-    earlier: np.ndarray  # effort of one tick before
-    slope: np.ndarray  # of the effort in time
+    earlier: np.ndarray  # effort one tick earlier
+    slope: np.ndarray  # time derivative of the effort
     motor: np.ndarray | None  # motor's angle, rad
     capstan: np.ndarray | None  # capstan's angle, rad
-    has_viscous: bool  # in the owner's model
+    has_viscous: bool  # whether the nominal model has viscous friction
     has_coulomb: bool
     has_spring: bool
     reels: bool
 
 
 def smoothed(y: np.ndarray, window: int, dt: float, derivative: int = 0) -> np.ndarray:
-    """A derivative of y by local cubics."""
+    """Derivative of y by local cubic polynomials (Savitzky-Golay)."""
     found: np.ndarray = savgol_filter(y, window, ORDER, deriv=derivative, delta=dt)
     return found
 
 
 def states(record: Record) -> States:
-    """States of a recording, with the owner's gains and ratios."""
+    """States of a recording, with nominal gains and ratios."""
     case, dt, plant = record.case, record.dt, record.plant
     n = len(record.t)
     p, window = believed(case), WINDOW[plant]
@@ -59,7 +59,7 @@ def states(record: Record) -> States:
         return smoothed(values, window, dt, derivative)[rows]
 
     def late(column: int, ticks: float) -> np.ndarray:
-        """A command as it acts, half a tick later for being held."""
+        """Effective command: delayed, and half a tick later by the hold."""
         return np.interp(np.arange(n) - ticks - 0.5, np.arange(n), record.u[:, column])
 
     def efforts(delay: float) -> list[np.ndarray]:
@@ -91,6 +91,6 @@ def states(record: Record) -> States:
 
 
 def moving(s: States) -> States:
-    """Rows at which it moves: dry friction at rest is whatever it takes."""
+    """States of rows in motion: dry friction at rest is undetermined."""
     rows = np.abs(s.v) > REST * np.abs(s.v).max()
     return States(*(value[rows] if isinstance(value, np.ndarray) else value for value in s))

@@ -1,4 +1,4 @@
-"""Residual whiteness: the owner's model with fitted parameters, and an alarm where its error is not white.
+"""Residual whiteness test: nominal model with fitted parameters, and an alarm where its residual is not white.
 
 Source: Ljung & Box, Biometrika 65 (1978), as in the validation of system identification toolboxes.
 """
@@ -31,7 +31,7 @@ def ljung_box(e: np.ndarray, lags: int = LAGS) -> float:
 
 
 def diagnose(record: Record) -> dict[str, Any]:
-    """`unnamed` where the error is not white; never a name."""
+    """Diagnosis `unnamed` where the residual is not white; never with a name."""
     error = refit(*together([graph_record(record)])).e
     worst = min(ljung_box(error[:, c]) for c in range(error.shape[1]))
     return diagnosis(record.plant, [], unnamed=worst < LEVEL)

@@ -1,6 +1,6 @@
-"""The law of law.hal in the steps of rtctl, in a thread that wakes as often: two `pd` and a `low_pass`.
+"""The law of law.hal with steps of rtctl, two `pd` and a `low_pass`, in a thread of the same rate.
 
-Timed as HAL times its functions: the counter of the CPU's clock is read before the first and after each.
+Timing as in HAL: the CPU's time stamp counter is read before the first step and after each step.
 """
 
 import platform
@@ -23,7 +23,7 @@ X86 = platform.machine() in ("x86_64", "AMD64")
 
 @intrinsic
 def cycles(typing_context):
-    """The CPU's time stamp counter, which rtapi_get_clocks() reads as well. Nothing in memory moves past it."""
+    """Time stamp counter of the CPU, as read by rtapi_get_clocks(). Acts as a barrier for memory accesses."""
 
     def codegen(context, builder, signature, args):
         kind = ir.FunctionType(ir.IntType(64), [])
@@ -58,7 +58,7 @@ def _run(p, s, took, period):
 
 
 def run(rate: float, seconds: float, priority: int) -> tuple[np.ndarray, float]:
-    """Times of all ticks in counts, and counts per ns. In a thread of its own, real-time as far as allowed."""
+    """Times of all ticks in counts, and counts per ns, from a separate thread, real-time where permitted."""
     dt = 1.0 / rate
     gains = pd.PdSettings(gain=0.3, tau_d=3e-5)
     params = {
@@ -70,7 +70,7 @@ def run(rate: float, seconds: float, priority: int) -> tuple[np.ndarray, float]:
     for name, value in params.items():
         fill_record(p[0][name], value)
     s = np.zeros(1, STATE)
-    _run(p, s, np.zeros(10, np.int64), 1000)  # compile before it is real-time
+    _run(p, s, np.zeros(10, np.int64), 1000)  # compiles before real-time scheduling
     took = np.zeros(round(rate * seconds), np.int64)
     out: list[float] = []
 

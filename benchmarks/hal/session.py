@@ -1,6 +1,6 @@
-"""One window of a HAL thread: law.hal in LinuxCNC's rtapi_app, with its wake-ups counted by wakeup.c.
+"""Window of a HAL thread: law.hal in LinuxCNC's rtapi_app, with wake-ups counted by wakeup.c.
 
-Nothing is installed. The component files are those of the package, and the counting library is preloaded.
+Installs nothing: component files come from the package, and the counting library is preloaded.
 """
 
 import os
@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 HERE = Path(__file__).parent
-BUCKETS = 1_000_000  # of wakeup.c, one a nanosecond, and one more for what is later
-NOBODY = 65534  # rtapi_app, started by root, wants another user to fall back to
+BUCKETS = 1_000_000  # buckets of wakeup.c, one per nanosecond, plus one for later wake-ups
+NOBODY = 65534  # user id to which rtapi_app drops when started by root
 REALTIME = Path("/usr/lib/linuxcnc/realtime")
 
 
@@ -23,14 +23,14 @@ class NoPeerError(Exception):
 
 
 class Window(NamedTuple):
-    """Lateness as counts by ns, and of each tick the counts of pid, lowpass, pid, and of the whole thread."""
+    """Histogram of lateness per ns, and clock counts per tick of pid, lowpass, pid, and of the whole thread."""
 
     wakeups: np.ndarray  # (BUCKETS + 1,)
     times: np.ndarray  # (ticks, 4)
 
 
 def why_not() -> str | None:
-    """What keeps this machine from measuring a HAL thread, in a sentence; None where nothing does."""
+    """Reason why a HAL thread cannot be measured here, as a sentence; None where it can."""
     if shutil.which("halrun") is None or not REALTIME.exists():
         return "LinuxCNC is not installed here; it comes with Debian's linuxcnc-uspace"
     if os.geteuid() != 0:
@@ -62,13 +62,13 @@ def build(folder: Path) -> Path:
 
 
 def run(library: Path, rate: float, seconds: float, folder: Path) -> Window:
-    """One window. Raises NoPeerError where LinuxCNC does not run in real time, with what it said."""
+    """Run one window. Raises NoPeerError with LinuxCNC's message where it does not run in real time."""
     shared = folder / "hal"  # rtapi_app opens its socket as NOBODY
     shutil.rmtree(shared, ignore_errors=True)
     shared.mkdir()
     shared.chmod(0o777)
     samples = shared / "samples"
-    wakeups = Path("/dev/shm") / f"rtctl-wakeups-{os.getpid()}"  # of memory: a disk's pages fault while written back
+    wakeups = Path("/dev/shm") / f"rtctl-wakeups-{os.getpid()}"  # in memory: a disk file would fault
     wakeups.write_bytes(bytes(4 * (BUCKETS + 1)))
     try:
         done = subprocess.run(
@@ -95,6 +95,6 @@ def run(library: Path, rate: float, seconds: float, folder: Path) -> Window:
 
 
 def _times(path: Path) -> np.ndarray:
-    """Rows of `halsampler`; a row after an overrun has the word in it and does not count."""
+    """Rows of `halsampler` without those after an overrun, which contain a word."""
     rows = [line.split() for line in path.read_text().splitlines()]
     return np.array([row for row in rows if len(row) == 4 and row[0].isdigit()], np.int64)

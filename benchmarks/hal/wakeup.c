@@ -1,12 +1,12 @@
-/* Preloaded into LinuxCNC's rtapi_app: counts how late its threads wake.
+/* Library preloaded into LinuxCNC's rtapi_app: histogram of the lateness of its threads.
  *
- * rtapi_app sleeps as cyclictest does, with clock_nanosleep(TIMER_ABSTIME) on CLOCK_MONOTONIC. Here that call is passed
- * on, and the time from when it should have returned to when the clock can be read is counted into the file $WAKEUP:
- * BUCKETS of one nanosecond, then one for all that is later, as 32-bit counts.
+ * rtapi_app sleeps with clock_nanosleep(TIMER_ABSTIME) on CLOCK_MONOTONIC, as cyclictest does. This library forwards the
+ * call and counts the time from the due return to the reading of the clock into the file $WAKEUP: BUCKETS of one
+ * nanosecond, then one bucket for later wake-ups, as 32-bit counts.
  *
- * Two calls that rtapi_app cannot do without, or it gives up real time, are forgiven where the machine refuses them:
- * iopl(), which a kernel may not have and only a parallel port needs, and setrlimit(), which takes CAP_SYS_RESOURCE and
- * which a thread that may use SCHED_FIFO anyway does not need.
+ * Failures of two calls are hidden, since rtapi_app would give up real time: iopl(), which a kernel may lack and only a
+ * parallel port needs, and setrlimit(), which needs CAP_SYS_RESOURCE; a thread with permission for SCHED_FIFO does not
+ * need it.
  */
 #define _GNU_SOURCE
 #include <dlfcn.h>

@@ -1,1 +1,1 @@
-"""Ways of others to fit a machine to a recording, each on the same rows: see benchmarks/identification_peers.py."""
+"""Other identification methods, each on equal rows of a recording: see benchmarks/identification_peers.py."""

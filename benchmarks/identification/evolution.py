@@ -1,4 +1,4 @@
-"""CMA-ES over a rigid body with one friction model chosen beforehand, simulated against the recording.
+"""CMA-ES fit of a rigid body with one fixed friction model by simulation of the recording.
 
 As PACE and BAM fit robots' joints: viscous friction, dry friction with Stribeck's peak, and friction in proportion to
 the load; inertia, weight and an offset. Simulated from smoothed states in windows of half a second.
@@ -10,7 +10,7 @@ import numpy as np
 
 from identification.records import Problem
 
-SECONDS = 0.5  # of a window
+SECONDS = 0.5  # s, length of a window
 EVALUATIONS = 4000
 NAMES = ("inertia", "viscous", "dry", "stribeck", "stribeck_speed", "load", "weight", "offset")
 

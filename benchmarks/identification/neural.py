@@ -1,4 +1,4 @@
-"""A small neural state-space model: the acceleration is a network of position, speed and force, trained on runs.
+"""Small neural state-space model: the acceleration is a network of position, speed and force, trained on simulations.
 
 Two layers of 16 units; windows of 50 rows from smoothed states; Adam, in JAX. As in Forgione & Piga, Continuous-time
 system identification with neural networks, Eur. J. Control 59 (2021).
@@ -17,7 +17,7 @@ UNITS, WINDOW, BATCH, STEPS, RATE = 16, 50, 32, 3000, 3e-3
 
 
 def fit(p: Problem) -> tuple[np.ndarray, dict[str, float]]:
-    """Free run (n - first,) over the rows to predict; a network has no numbers that mean anything."""
+    """Free run (n - first,) over the rows to predict, and no parameters: those of a network have no meaning."""
     states, column = p.states, 1 if p.shows_speed else 0
     scale = jnp.array([max(np.std(states[:, 0]), 1e-12), max(np.std(states[:, 1]), 1e-12), np.std(p.force) or 1.0])
     a0 = float(np.std(np.gradient(states[: p.first, 1], p.dt)))
@@ -59,6 +59,6 @@ def fit(p: Problem) -> tuple[np.ndarray, dict[str, float]]:
 
 
 def _moved(k: int, w: Any, m: Any, v: Any) -> Any:
-    """Weights after step k of Adam, at a rate that fades as a cosine."""
+    """Weights after step k of Adam with a cosine-decaying rate."""
     rate = RATE * 0.5 * (1.0 + np.cos(np.pi * k / STEPS))
     return w - rate * (m / (1.0 - 0.9**k)) / (jnp.sqrt(v / (1.0 - 0.999**k)) + 1e-8)

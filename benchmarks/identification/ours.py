@@ -1,4 +1,4 @@
-"""`rtctl diagnose` of the rows to fit, and a free run of its model from the same state as the others."""
+"""`rtctl diagnose` of the rows to fit, and a free run of its model from the common initial state."""
 
 import tempfile
 from pathlib import Path
@@ -19,7 +19,7 @@ from rtctl.trace.bundle import PARQUET, save_case
 
 
 def nominal(p: Problem) -> tuple[np.ndarray, dict[str, float]]:
-    """Free run of the description alone, its numbers fitted to the rows before."""
+    """Free run of the nominal model, with numbers fitted to the rows before, and these numbers."""
     found = refit(*together([of_bundle(rows_of(p.bundle, 0, p.first))]))
     return free(p, found.model), {}
 
@@ -37,7 +37,7 @@ def fit(p: Problem) -> tuple[np.ndarray, dict[str, float], str]:
 
 
 def free(p: Problem, model: GraphModel) -> np.ndarray:
-    """Readings (n - first,) of a model in a free run from the smoothed state at the first row to predict."""
+    """Free run (n - first,) of a model from the smoothed state at the first row to predict."""
     late = of_bundle(rows_of(p.bundle, p.first, len(p.seen)))
     sim = Simulator(late)
     x, v = p.states[p.first]

@@ -1,4 +1,4 @@
-"""Recordings of machines of one body, as every method gets them: rows to fit, and rows to predict in a free run."""
+"""Recordings of machines of one body for all methods: rows to fit, and rows to predict in a free run."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,11 +13,11 @@ from rtctl.diagnose.model.recording import GraphRecord, levers
 from rtctl.trace.bundle import Bundle, load_bundle
 
 G = 9.81  # m/s^2
-AROUND = 10  # rows on each side of the release from which position and speed there are taken
+AROUND = 10  # rows on each side of the start of the free run, for its initial state
 
 
 class Owner(NamedTuple):
-    """What the owner believes of the one body, SI: the structure that a hand-written fit has."""
+    """Nominal values of the body, SI: the structure of a hand-written fit."""
 
     inertia: float  # kg or kg m^2
     viscous: float
@@ -27,17 +27,17 @@ class Owner(NamedTuple):
 
 @dataclass(frozen=True)
 class Problem:
-    """One recording: n rows, of which the last quarter is predicted."""
+    """Recording of n rows; the last quarter is predicted."""
 
     name: str
     dt: float  # s
-    force: np.ndarray  # (n,) N or Nm at the body, by the owner's gains
+    force: np.ndarray  # (n,) N or Nm at the body, by nominal gains
     seen: np.ndarray  # (n,) position, rad or m, or speed
     shows_speed: bool
     owner: Owner
     bundle: Bundle
     record: GraphRecord
-    first: int  # row with which the prediction begins
+    first: int  # first row to predict
 
     @property
     def spread(self) -> float:
@@ -46,7 +46,7 @@ class Problem:
 
     @property
     def states(self) -> np.ndarray:
-        """Position and speed (n, 2) at every row by local polynomials: start of a window, and data of a regression."""
+        """Position and speed (n, 2) by local polynomials, for initial states of windows and for regressions."""
         from scipy.signal import savgol_filter
 
         width = 2 * AROUND + 1
@@ -56,13 +56,13 @@ class Problem:
         return np.stack([savgol_filter(self.seen, width, 3, d, self.dt) for d in (0, 1)], axis=1)
 
     def error(self, predicted: np.ndarray) -> float:
-        """Rms error of a free run (n - first,) by the spread of the readings; inf where it ran away."""
+        """Rms error of a free run (n - first,) over the standard deviation of the readings; inf where it diverged."""
         e = predicted - self.seen[self.first :]
         return float(np.sqrt(np.mean(e**2)) / self.spread) if np.isfinite(e).all() else float("inf")
 
 
 def problem(folder: Path) -> Problem:
-    """The problem of a bundle of one body with one drive. Raises ValueError where the machine is another one."""
+    """Problem of a bundle with one body and one drive. Raises ValueError for other machines."""
     bundle = load_bundle(folder)
     record = of_bundle(bundle)
     machine, model = record.case.machine, nominal(record.case)
@@ -84,5 +84,5 @@ def problem(folder: Path) -> Problem:
 
 
 def rows_of(bundle: Bundle, begin: int, end: int) -> Bundle:
-    """Some rows of a bundle."""
+    """Bundle with the rows [begin, end)."""
     return Bundle({name: c[begin:end] for name, c in bundle.columns.items()}, bundle.case, bundle.folder, bundle.units)

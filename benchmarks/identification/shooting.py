@@ -1,7 +1,7 @@
-"""Multiple shooting of the owner's structure in CasADi: states at the starts of short windows are unknowns as well.
+"""Multiple shooting of the nominal structure in CasADi: initial states of short windows are additional unknowns.
 
-As nlgreyfast does (Bock & Plitt 1984); solved by IPOPT. The structure is the owner's, with viscous and dry friction
-set free, which an engineer would do.
+As in nlgreyfast (Bock & Plitt 1984), solved by IPOPT. The structure is that of the nominal model with free viscous and
+dry friction, as an engineer would choose.
 """
 
 import casadi as ca
@@ -9,9 +9,9 @@ import numpy as np
 
 from identification.records import Problem
 
-WINDOW = 40  # rows
-ROWS = 3000  # that are fitted, at most: of more, every so many
-SOFT = 0.02  # of the largest speed, within which dry friction turns
+WINDOW = 40  # rows of a window
+ROWS = 3000  # most fitted rows; longer recordings are decimated
+SOFT = 0.02  # share of the largest speed: width of the reversal of dry friction
 
 
 def fit(p: Problem) -> tuple[np.ndarray, dict[str, float]]:

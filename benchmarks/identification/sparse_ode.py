@@ -1,4 +1,4 @@
-"""PySINDy: sparse regression of the acceleration on a library of terms; the equation is then run freely."""
+"""PySINDy: sparse regression of the acceleration on a library of terms, and free run of the equation."""
 
 import numpy as np
 import pysindy as ps
@@ -11,7 +11,7 @@ LEVELS = (
     0.01,
     0.03,
     0.1,
-)  # of a term's share of the acceleration, below which it goes; best on the last fitted rows
+)  # thresholds of a term's share of the acceleration; the best one on the last fitted rows is used
 
 
 def fit(p: Problem) -> tuple[np.ndarray, dict[str, float]]:
@@ -56,7 +56,7 @@ def fit(p: Problem) -> tuple[np.ndarray, dict[str, float]]:
 
 
 def run(library, w: np.ndarray, state: np.ndarray, force: np.ndarray, dt: float) -> np.ndarray:
-    """States (n, 2) of the equation from a state."""
+    """States (n, 2) of the equation from an initial state."""
     out = np.empty((len(force), 2))
     x, v = float(state[0]), float(state[1])
     h = dt / SUBSTEPS

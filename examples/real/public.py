@@ -1,10 +1,10 @@
-"""Recordings of public repositories as plain CSV with names, as the cases below `public/` take them.
+"""Conversion of recordings in public repositories to plain CSV with column names, for the cases in `public/`.
 
     python examples/real/public.py CLONES OUT
 
-CLONES holds the repositories as folders OWNER/NAME, cloned by whoever runs this; OUT is `../shared/data/public` for the
-tests. Columns get names, counts of milliseconds become seconds, and rows that repeat the one before, because the logger
-wrote faster than it read, are left out. Nothing else is changed.
+CLONES holds the repositories as folders OWNER/NAME, cloned by the user. OUT is `../shared/data/public` for the tests.
+Columns get names, milliseconds become seconds, and repeated rows of a logger faster than its readings are left out.
+Nothing else is changed.
 """
 
 import gzip
@@ -16,15 +16,15 @@ import numpy as np
 
 
 class Source(NamedTuple):
-    """Where a recording comes from, and which of its columns are kept."""
+    """Source of a recording, and its selected columns."""
 
     repository: str
-    commit: str  # that was read
+    commit: str  # commit of the file
     file: str
     columns: dict[str, int]  # name -> column of the file
-    every: int = 1  # rows
+    every: int = 1  # keep the first of so many rows
     milliseconds: bool = False
-    centred: str = ""  # column whose mean is taken off
+    centred: str = ""  # column whose mean is subtracted
 
 
 SOURCES = {
@@ -53,13 +53,13 @@ SOURCES = {
 
 
 def rows_of(text: str) -> np.ndarray:
-    """Numbers (n, columns) of a text, whatever separates them; lines that begin with no number are left out."""
+    """Numbers (n, columns) of a text with any separator, without lines that do not begin with a number."""
     lines = [line.replace(",", " ").split() for line in text.splitlines()]
     return np.array([[float(cell) for cell in cells] for cells in lines if cells and cells[0][0] in "-0123456789"])
 
 
 def prepared(source: Source, text: str) -> dict[str, np.ndarray]:
-    """Columns (n,) of a recording by their names."""
+    """Columns (n,) of a recording by name."""
     table = rows_of(text)[:: source.every]
     out = {name: table[:, column] for name, column in source.columns.items()}
     if source.milliseconds:
@@ -70,7 +70,7 @@ def prepared(source: Source, text: str) -> dict[str, np.ndarray]:
 
 
 def main(clones: Path, out: Path) -> None:
-    """Write every recording whose repository is there, and say which are not."""
+    """Write every recording with a cloned repository, and print the missing repositories."""
     out.mkdir(parents=True, exist_ok=True)
     for name, source in SOURCES.items():
         file = clones / source.repository / source.file

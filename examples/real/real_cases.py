@@ -17,12 +17,12 @@ def cases() -> dict[str, dict[str, Any]]:
 
 
 def missing(case: dict[str, Any]) -> str:
-    """The first recording of a case that is not beside the project; "" where all are."""
+    """First missing recording of a case; "" where none is missing."""
     return next((recording for recording in case["recordings"] if not (DATA / recording).exists()), "")
 
 
 def imports(case: dict[str, Any], out: Path) -> list[list[str]]:
-    """Words of `rtctl import` for each recording with a description; the bundles go into `out`."""
+    """Arguments of `rtctl import` for each recording with a description; the bundles go into `out`."""
     lines = []
     for recording in case["recordings"]:
         machine = machine_of(case, recording)
@@ -40,23 +40,23 @@ def imports(case: dict[str, Any], out: Path) -> list[list[str]]:
 
 
 def diagnosis(case: dict[str, Any], out: Path) -> list[str]:
-    """Words of `rtctl diagnose`, run in FOLDER; the results go into `out`/diagnosis."""
+    """Arguments of `rtctl diagnose`, run in FOLDER; the results go into `out`/diagnosis."""
     bundles = [str(bundle(case, recording, out)) for recording in case["recordings"]]
     together = ["--together"] if len(bundles) > 1 else []
     return ["diagnose", *bundles, *together, "-o", str(out / "diagnosis"), *case.get("options", [])]
 
 
 def machine_of(case: dict[str, Any], recording: str) -> str | None:
-    """Description of a recording; None of a bundle that has its own."""
+    """Description of a recording; None for a bundle, which includes its description."""
     machine = case.get("machine")
     return machine[stem(recording)] if isinstance(machine, dict) else machine
 
 
 def bundle(case: dict[str, Any], recording: str, out: Path) -> Path:
-    """Where the bundle of a recording lies, or is made."""
+    """Path of the bundle of a recording, existing or to be imported."""
     return DATA / recording if machine_of(case, recording) is None else out / stem(recording)
 
 
 def stem(recording: str) -> str:
-    """Name of a recording without folder and ending."""
+    """Name of a recording without folder and suffix."""
     return Path(recording).name.partition(".")[0]

@@ -1,12 +1,12 @@
-"""Diagnose recordings of real machines, and write down what is found.
+"""Diagnosis of recordings of real machines, with a table of results.
 
     python examples/real/run.py [--out FOLDER] [--limit SECONDS] [CASE ...]
     python examples/real/run.py --table
 
 Each case of cases.yaml (all where none is named) is imported and diagnosed in a process of its own. `found/CASE.json`
 then holds verdict, effects and held-out errors, docs/images/real/CASE_missing.png and CASE_heldout.png its figures,
-FOLDER (build/real) all the rest. The environment's REAL_DATA is where the recordings lie, if not in ../shared/data.
---table writes the table of docs/proof.md anew, of what `found` holds.
+FOLDER (build/real) the other files. The environment variable REAL_DATA names the folder of the recordings, by default
+../shared/data. --table rewrites the table of docs/proof.md from the files in `found`.
 """
 
 import argparse
@@ -24,12 +24,12 @@ FOUND = FOLDER / "found"
 IMAGES = ROOT / "docs" / "images" / "real"
 DIGITS = 3
 PAGE = ROOT / "docs" / "proof.md"
-NUMBER = re.compile(r"The machine acts as if (.*?) instead of")  # a number of the description that is wrong by far
+NUMBER = re.compile(r"The machine acts as if (.*?) instead of")  # a description value far outside its tolerance
 BEGIN, END = "<!-- found: begin -->", "<!-- found: end -->"
 
 
 def run(name: str, case: dict[str, Any], out: Path) -> None:
-    """Import, diagnose and write down one case, in this process."""
+    """Import and diagnose one case in this process, and write its result."""
     import rtctl
     from rtctl.diagnose.answer import figures
 
@@ -53,13 +53,13 @@ def run(name: str, case: dict[str, Any], out: Path) -> None:
 
 
 def keywords(case: dict[str, Any]) -> dict[str, Any]:
-    """Options of `rtctl diagnose` as those of rtctl.diagnose()."""
+    """Options of `rtctl diagnose` as keyword arguments of rtctl.diagnose()."""
     options = case.get("options", [])
     return {word[2:]: value for word, value in zip(options[::2], options[1::2], strict=True)}
 
 
 def short(told: dict[str, Any]) -> dict[str, Any]:
-    """What is kept of diagnosis.json; three digits, since another processor has others."""
+    """Part of diagnosis.json for `found`, with three digits: further digits depend on the processor."""
     fit, located = told["fit"], told["located"]
     return {
         "verdict": told["verdict"],
@@ -81,12 +81,12 @@ def short(told: dict[str, Any]) -> dict[str, Any]:
 
 
 def rounded(value: float | None) -> float | None:
-    """Three digits."""
+    """Value rounded to three digits."""
     return None if value is None else float(f"{value:.{DIGITS}g}")
 
 
 def table() -> str:
-    """A line for each case that was run, in the order of cases.yaml."""
+    """Markdown table with a row for each finished case, in the order of cases.yaml."""
     lines = ["| case | known from elsewhere | found | held-out before, after |", "|---|---|---|---|"]
     for name, case in cases().items():
         file = FOUND / f"{name}.json"
@@ -96,13 +96,13 @@ def table() -> str:
 
 
 def page(text: str) -> str:
-    """The page of proofs with the table of what was found."""
+    """Text of docs/proof.md with the new table of results."""
     head, _, rest = text.partition(BEGIN)
     return f"{head}{BEGIN}\n\n{table()}\n\n{END}{rest.partition(END)[2]}"
 
 
 def row(name: str, case: dict[str, Any], found: dict[str, Any]) -> str:
-    """One line of the table; a name that is known to be wrong is bold."""
+    """Row of the table; a name known to be wrong is bold."""
     wrong = case.get("wrong", [])
     names = []
     for e in found["effects"]:
@@ -121,7 +121,7 @@ def row(name: str, case: dict[str, Any], found: dict[str, Any]) -> str:
 
 
 def main() -> None:
-    """Each case in a process of its own, so that one that takes too long can be ended."""
+    """Run each case in a separate process, which can be ended at the time limit."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("cases", nargs="*", metavar="CASE")
     parser.add_argument("--out", type=Path, default=ROOT / "build" / "real")

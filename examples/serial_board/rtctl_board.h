@@ -1,12 +1,12 @@
-/* The device's end of rtctl's serial frame, for any microcontroller with a C99 compiler. No heap, no operating system.
+/* Device side of rtctl's serial frame, for any microcontroller with a C99 compiler. No heap, no operating system.
  *
  *   static rtctl_board board;
- *   rtctl_begin(&board, 1, 0, 1, 0, "my board");        outputs, inputs, counters, lines that it can write (bits)
+ *   rtctl_begin(&board, 1, 0, 1, 0, "my board");        outputs, inputs, counters, writable lines (bits)
  *   for (;;) {
- *     board.counter[0] = encoder_counts;                 before the bytes are handed over: what a sample says
- *     while (a byte has come)
+ *     board.counter[0] = encoder_counts;                 before rtctl_byte: values of the next sample
+ *     while (a byte is available)
  *       if (rtctl_byte(&board, byte, millis())) send(board.reply, board.reply_length);
- *     rtctl_watch(&board, millis());                     outputs to zero where the computer is silent
+ *     rtctl_watch(&board, millis());                     sets outputs to zero where the computer is silent
  *     set_motor(board.on ? board.output[0] : 0.0f);      V, A or Nm: the unit of the drive in the config
  *   }
  *
@@ -24,18 +24,18 @@
 
 typedef struct {
   /* what the program reads */
-  float output[RTCTL_MOST]; /* in the units of the machine's config; zero while nobody commands */
-  uint8_t on;               /* 1 while the machine is switched on: power the drives then and at no other time */
-  uint8_t lines_out;        /* digital lines, a bit each */
+  float output[RTCTL_MOST]; /* in the units of the machine's config; zero without commands */
+  uint8_t on;               /* 1 while the machine is switched on: power the drives only then */
+  uint8_t lines_out;        /* digital lines, one bit each */
   /* what the program writes */
   uint32_t counter[RTCTL_MOST]; /* encoder counts; they may wrap */
   float input[RTCTL_MOST];      /* in the units of the machine's config */
   uint8_t lines_in;
-  uint8_t fault; /* 0, or a number of your own that ends the run: over-temperature, emergency stop */
-  /* an answer that is to be sent when rtctl_byte returns 1 */
+  uint8_t fault; /* 0, or a fault number of your choice that ends the run: over-temperature, emergency stop */
+  /* answer to send when rtctl_byte returns 1 */
   uint8_t reply[260];
   uint16_t reply_length;
-  /* its own */
+  /* internal */
   uint8_t outputs, inputs, counters, lines;
   char name[17];
   uint8_t frame[260];
@@ -65,7 +65,7 @@ static inline void rtctl_off(rtctl_board *b) {
   b->on = 0, b->lines_out = 0;
 }
 
-/* Call it in every turn: outputs are zero where the computer has been silent for its time-out. */
+/* Call in every loop: sets outputs to zero where the computer is silent for longer than its time-out. */
 static inline void rtctl_watch(rtctl_board *b, uint32_t now_ms) {
   if (now_ms - b->heard > b->patience) rtctl_off(b);
 }
@@ -77,7 +77,7 @@ static inline void rtctl_answer(rtctl_board *b, uint8_t kind, uint8_t length) {
   b->reply_length = (uint16_t)(length + 5);
 }
 
-/* Takes one byte; returns 1 where `reply` is to be sent. */
+/* Processes one byte; returns 1 when `reply` must be sent. */
 static inline int rtctl_byte(rtctl_board *b, uint8_t byte, uint32_t now_ms) {
   if (b->at == 0 && byte != 0xA5) return 0;
   b->frame[b->at++] = byte;

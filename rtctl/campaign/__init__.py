@@ -1,1 +1,1 @@
-"""Campaigns: one config run many times over a matrix of settings, on virtual time, with a table and a report of all."""
+"""Campaigns: runs of one config over a matrix of settings on virtual time, with a results table and a report."""

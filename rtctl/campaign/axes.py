@@ -1,4 +1,4 @@
-"""The axes of a campaign, resolved: every value as plain data in SI, every file read, every path known to be one."""
+"""Resolved axes of a campaign: values as plain data in SI, files read, paths checked."""
 
 from collections.abc import Callable
 from typing import Any
@@ -14,15 +14,15 @@ from rtctl.config.load import load_settings
 from rtctl.config.units import to_si
 
 CONFIG, REFERENCE = "config", "reference"
-LONGEST = 60  # characters of a label
+LONGEST = 60  # characters, longest label
 
-Axis = list[dict[str, Any]]  # columns that step together, each: name, paths, values, labels, unit
+Axis = list[dict[str, Any]]  # columns that step together; each has name, paths, values, labels, unit
 Where = Callable[[tuple], str]  # keys of the campaign file -> file and line
-Find = Callable[[str], Any]  # name of a file -> where it is
+Find = Callable[[str], Any]  # name of a file -> path
 
 
 def resolve(name: str, given: Any, base: Any, where: Where, find: Find) -> Axis:
-    """The axis under the key `name` of a matrix, for machines like `base`. Raises UserError with file and line."""
+    """Axis of the key `name` of a matrix, for machines like `base`. Raises UserError with file and line."""
     key: tuple = ("matrix", name)
     settings = _checked(given, where, key)
     if settings.together is None:
@@ -42,7 +42,7 @@ def resolve(name: str, given: Any, base: Any, where: Where, find: Find) -> Axis:
 
 
 def _checked(given: Any, where: Where, key: tuple) -> AxisSettings:
-    """An axis as it was written: a list is its values."""
+    """Axis settings as written; a list stands for `values`."""
     data = {"values": given} if isinstance(given, list) else given
     try:
         return AxisSettings.model_validate(data)
@@ -71,7 +71,7 @@ def _column(name: str, axis: AxisSettings, base: Any, where: Where, find: Find, 
 
 
 def _values(axis: AxisSettings, unit: str | None) -> list[Any]:
-    """The values as they are written, or drawn. Raises ValueError."""
+    """Values as written or as drawn. Raises ValueError."""
     if axis.values is not None:
         return list(axis.values.values() if isinstance(axis.values, dict) else axis.values)
     if axis.range is not None:
@@ -106,7 +106,7 @@ def _number(value: Any, unit: str | None) -> Any:
 
 
 def _plain(value: Any, unit: str | None) -> Any:
-    """A text such as "22 mm" as a number in the unit of the setting. What does not fit is left for the run to tell."""
+    """Number in the unit of the setting for a text such as "22 mm". The run reports a value that does not fit."""
     if unit is None or not isinstance(value, str):
         return value
     try:
@@ -116,7 +116,7 @@ def _plain(value: Any, unit: str | None) -> Any:
 
 
 def _label(value: Any) -> Any:
-    """What the table shows of a value: itself, or a word for what is none."""
+    """Label of a value in the table: the value, or a text where it is no scalar."""
     if value is None or isinstance(value, (bool, int, float, str)):
         return value
     text = ", ".join(_words(item) for item in value) if isinstance(value, list) else _words(value)
@@ -132,13 +132,13 @@ def _words(value: Any) -> str:
 
 
 def reference_of(base: Any, name: str, find: Find) -> Any:
-    """A reference's file as plain data, in the machine's own units. Raises UserError."""
+    """Reference file as plain data in the units of the machine. Raises UserError."""
     model = type(base).model_fields[REFERENCE].annotation
     return written(load_settings(find(name), model, []))
 
 
 def place_of(settings: Any, path: str) -> Shape:
-    """The place of a dotted path in a config. Raises UserError where there is no such key."""
+    """Shape of a config at a dotted path. Raises UserError for an unknown key."""
     place, node = Shape(type(settings), model=type(settings)), settings
     parts = path.split(".")
     for i, part in enumerate(parts):
@@ -150,7 +150,7 @@ def place_of(settings: Any, path: str) -> Shape:
             raise UserError(f"'{part[:40]}' is not an index of {here}; write e.g. {here}.0")
         found = child(place, int(part) if index else part)
         if found is None and place.choices:
-            return Shape(None)  # which of them is chosen elsewhere
+            return Shape(None)  # a union; another key selects its member
         if found is None:
             known = place.model.model_fields if place.model else ()
             raise UserError(f"{path}: unknown key '{part[:40]}'; {unknown(part, known)}")

@@ -1,4 +1,4 @@
-"""A campaign from its plan to its report: runs what is not done yet, keeps the rows, the bundles and a summary."""
+"""Execution of a campaign: missing runs, result rows, bundles, report and summary."""
 
 import time
 from collections.abc import Callable, Sequence
@@ -14,7 +14,7 @@ from rtctl.campaign.conditions import Condition, Judged
 from rtctl.campaign.plan import Plan
 from rtctl.campaign.store import RESULTS, Store
 
-SHOWN = ("min", "median", "p99", "max")  # statistics of a summary
+SHOWN = ("min", "median", "p99", "max")  # statistics in a summary
 
 Progress = Callable[[int, int, int], None]  # runs done, of how many, failed so far
 
@@ -28,9 +28,9 @@ def run(
     baseline: Path | None = None,
     progress: Progress = lambda *_: None,
 ) -> dict[str, Any]:
-    """Run what is not in `folder` yet, and write table, bundles and report there. Returns the summary of `--json`.
+    """Run the missing runs of `folder`, and write table, bundles and report there; returns the summary of `--json`.
 
-    Raises UserError where the folder holds another campaign or there is no such baseline or scheduler, and PoolError
+    Raises UserError where the folder holds another campaign, or where baseline or scheduler do not exist, and PoolError
     where a worker died.
     """
     began = time.monotonic()
@@ -67,14 +67,14 @@ def run(
 
 
 def compare_early(plan: Plan, baseline: Path) -> None:
-    """A baseline that is none is told before the runs, not after them. Raises UserError."""
+    """Check the baseline before the runs. Raises UserError for an invalid baseline."""
     from rtctl.campaign.store import load_results
 
     load_results(baseline)
 
 
 def judge(plan: Plan, table: pa.Table, given: Sequence[Condition], compared: Comparison | None) -> list[Judged]:
-    """What becomes of each condition."""
+    """Results of the `given` conditions."""
     columns = {name: keep.values_of(table, name) for name in plan.metrics}
     columns |= {name: keep.flags(table, name) for name in ("trip", "error")} | {"failed": keep.failed(plan, table)}
     regressions = None if compared is None else compared.regressions
@@ -82,7 +82,7 @@ def judge(plan: Plan, table: pa.Table, given: Sequence[Condition], compared: Com
 
 
 def summary(plan: Plan, table: pa.Table, judged: Sequence[Judged], compared: Comparison | None) -> dict[str, Any]:
-    """Counts and statistics of the table, as `--json` prints them."""
+    """Summary of the table: counts and statistics, as printed by `--json`."""
     found: dict[str, Any] = {
         "campaign": plan.name,
         "hash": plan.identity,
@@ -108,7 +108,7 @@ def summary(plan: Plan, table: pa.Table, judged: Sequence[Judged], compared: Com
 
 
 def statistics(values: np.ndarray) -> dict[str, float]:
-    """A few statistics of a metric and how many runs have it."""
+    """Statistics of a metric, and the number of runs that have it."""
     found = {name: conditions.statistic(name, values, len(values)) for name in SHOWN}
     return {**found, "count": int(np.isfinite(values).sum())}
 

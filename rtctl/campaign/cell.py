@@ -1,7 +1,7 @@
-"""One run of a campaign, and a chunk of them: what a worker does, be it in this process, another or on another machine.
+"""Execution of one run of a campaign, and of a chunk of runs, in this process or in a worker.
 
-Writing a machine's tick takes longer than running it. So the generated module is kept for each structure, and what
-differs between runs (gains, radii, references, seeds, faults) goes into records.
+Generation of a machine's tick takes longer than its run. Therefore the generated module is cached for each structure,
+and differences between runs (gains, radii, references, seeds, faults) go into records.
 """
 
 import threading
@@ -25,16 +25,16 @@ _lock = threading.Lock()  # a Dask worker may have several threads
 
 
 def run_chunk(payload: dict[str, Any], identity: str, chunk: int) -> list[dict[str, Any]]:
-    """Rows of the results of one chunk."""
+    """Result rows of one chunk."""
     with _lock:
         for base in payload["bases"].values():
-            trust(base.get("own", {}).values())  # from the process that read the campaign's file
+            trust(base.get("own", {}).values())  # trusted: sent by the process that read the campaign file
         plan = _plans.get(identity) or _plans.setdefault(identity, Plan(payload))
     return [run_row(plan, number) for number in plan.numbers(chunk)]
 
 
 def run_row(plan: Plan, number: int) -> dict[str, Any]:
-    """Row of one run. A setting that does not fit is told in the row, and not raised."""
+    """Result row of one run. The row reports an invalid setting; none is raised."""
     row: dict[str, Any] = {"run": number, **plan.labels(number)}
     try:
         run = play(plan, number)
@@ -47,20 +47,20 @@ def run_row(plan: Plan, number: int) -> dict[str, Any]:
 
 
 def _trouble(run: Run) -> str:
-    """Why a run says nothing, "" where it does."""
+    """Reason why a run has no result, "" where it has one."""
     if run.tripped or (run.rows["state"] == safety.RUNNING).any():
         return ""
     return f"was not running within {len(run.rows) / run.loop.machine.rate:g} s; give it more `seconds`"
 
 
 def play(plan: Plan, number: int) -> Run:
-    """Run it. Raises UserError and ValueError where its settings do not fit."""
+    """Finished run `number`. Raises UserError and ValueError for invalid settings."""
     machine = machines.build(plan.config(number))
     return fused.play(machine, structure(machine), plan.ticks(machine))
 
 
 def structure(machine: Machine) -> generate.Generated:
-    """The generated module of a machine; the same for all that differ in numbers only."""
+    """Generated module of a machine, shared by machines that differ only in numbers."""
     loop, plant = machine.diagram, machine.plant_diagram
     key = (
         machine.kind, machine.substeps, machine.truth, tuple(machine.config.record.trace),
@@ -88,7 +88,7 @@ def _fields(value: Any) -> Any:
 
 
 def clear() -> None:
-    """Forget modules and plans."""
+    """Clear the caches of modules and plans."""
     with _lock:
         _made.clear()
         _plans.clear()

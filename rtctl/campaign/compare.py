@@ -1,12 +1,12 @@
-"""A campaign against an earlier one: which metrics got worse, and where, beyond what noise makes of them.
+"""Comparison of a campaign with a baseline campaign: significant changes of metrics, by groups of runs.
 
-Runs are matched by their values on the axes that both campaigns have. Runs that differ in `loop.seed` only are a group:
-their differences new - old (n,) are repeated measurements of one change. A group got worse where
+Runs are matched by their values on the common axes. Runs that differ only in `loop.seed` are a group: their differences
+new - old (n,) are repeated measurements of one change. A group got worse where
 
-- n >= 3: the mean difference is worse than t(0.01 / tests, n - 1) of its standard errors, so that noise alone marks
-  anything at all in one comparison of a hundred; and it is more than 1 % of the baseline
-- n < 3: nobody knows the noise; the mean difference is more than 5 % of the baseline
-- a run that had the metric has none now, such as a step that does not settle any more
+- n >= 3: the mean difference is worse than t(0.01 / tests, n - 1) standard errors, a familywise error rate of 1 %, and
+  more than 1 % of the baseline
+- n < 3: the noise is unknown, and the mean difference is more than 5 % of the baseline
+- a run lost the metric, such as a step that no longer settles
 
 Source: Student's t with Bonferroni's correction, e.g. Montgomery, Design and Analysis of Experiments, 3.5.
 """
@@ -25,19 +25,19 @@ from rtctl.campaign.store import load_results
 from rtctl.config.errors import UserError
 
 SEED = "loop.seed"
-LEVEL = 0.01  # chance that noise marks anything in a comparison
-SMALL = 0.01  # of the baseline: a change below it is none to speak of
-UNKNOWN = 0.05  # of the baseline, where too few seeds say what noise is
-LEAST = 3  # matching runs that tell what noise is
-TRIP_TIME = "trip_s"  # which a run that does not trip has not
+LEVEL = 0.01  # familywise error rate of a comparison
+SMALL = 0.01  # share of the baseline: least change that counts
+UNKNOWN = 0.05  # share of the baseline: least change that counts with fewer than LEAST seeds
+LEAST = 3  # matching runs needed to estimate the noise
+TRIP_TIME = "trip_s"  # only tripped runs have this metric
 NAN = float("nan")
 SAME, BETTER, WORSE = "same", "better", "worse"
 
 
 class Change(NamedTuple):
-    """One metric in one group of matching runs. `noise` is one standard error of `change`, nan where nobody knows.
+    """One metric in one group of matching runs. `noise` is one standard error of `change`, nan where unknown.
 
-    `now` is nan where these runs have none any more.
+    `now` is nan where the runs lost the metric.
     """
 
     metric: str
@@ -54,7 +54,7 @@ class Change(NamedTuple):
 
 
 class Comparison(NamedTuple):
-    """All changes; runs that fail now and did not, and the other way round, by their numbers now."""
+    """All changes; numbers (in the new campaign) of runs that newly fail and of runs that no longer fail."""
 
     folder: str
     matched: int
@@ -63,18 +63,18 @@ class Comparison(NamedTuple):
     mended: list[int]
 
     def of(self, verdict: str) -> list[Change]:
-        """Changes of one verdict: what is lost first, then the largest share of the baseline."""
+        """Changes with one verdict: lost metrics first, then by decreasing share of the baseline."""
         found = [c for c in self.changes if c.verdict == verdict]
         return sorted(found, key=lambda c: -abs(c.change) / max(abs(c.baseline), 1e-12) if c.now == c.now else -np.inf)
 
     @property
     def regressions(self) -> int:
-        """Groups that got worse and runs that broke."""
+        """Number of groups that got worse and of runs that newly fail."""
         return len(self.of(WORSE)) + len(self.broken)
 
 
 def compare(plan: Plan, table: pa.Table, folder: Path | str) -> Comparison:
-    """Compare with the campaign in `folder`. Raises UserError where there is none or no run matches."""
+    """Comparison with the campaign in `folder`. Raises UserError where it is no campaign or no run matches."""
     old_plan, old = load_results(folder)
     axes = [name for name in plan.columns if name in old_plan.columns]
     groups = [name for name in axes if name != SEED]
@@ -116,7 +116,7 @@ def _keys(table: pa.Table, names: list[str]) -> list[tuple]:
 
 
 def _groups(table: pa.Table, names: list[str], rows: np.ndarray) -> dict[tuple, np.ndarray]:
-    """Places in `rows` of each combination of values."""
+    """Indices in `rows` of each combination of values."""
     found: dict[tuple, list[int]] = {}
     for place, key in enumerate(_keys(table.take(rows), names)):
         found.setdefault(key, []).append(place)
@@ -124,7 +124,7 @@ def _groups(table: pa.Table, names: list[str], rows: np.ndarray) -> dict[tuple, 
 
 
 def _change(metric: str, group: dict[str, Any], old: np.ndarray, new: np.ndarray, tests: int) -> Change:
-    """The verdict on one group, by the rule on top."""
+    """Change and verdict of one group, by the rule in the module docstring."""
     d, n = new - old, len(new)
     mean, scale = float(d.mean()), abs(float(old.mean()))
     if n >= LEAST:

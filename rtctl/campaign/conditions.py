@@ -1,7 +1,7 @@
 """Conditions on the results, such as `final_error_mm.p99 > 0.1`, that fail a campaign.
 
-metric.statistic, a comparison and a number, nothing else. nan is left out of a statistic: `count` is how many runs have
-the value, `share` how many of all.
+A condition is metric.statistic, a comparison and a number. Statistics ignore nan: `count` is the number of runs with a
+value, `share` their share of all runs.
 """
 
 import operator
@@ -29,14 +29,14 @@ STATISTICS: dict[str, Callable[[np.ndarray], float]] = {
     "p99": lambda x: np.percentile(x, 99),
 }
 COUNTS = ("count", "share")
-OF_RUNS = ("trip", "error", "failed")  # what has counts only
+OF_RUNS = ("trip", "error", "failed")  # metrics with only counts
 REGRESSIONS = "regressions"  # against a baseline
 EXAMPLE = "final_error_mm.p99 > 0.1"
 LONGEST = 200  # characters
 
 
 class Condition(NamedTuple):
-    """One condition, as it was written and in parts."""
+    """Condition as text and in parts."""
 
     text: str
     metric: str
@@ -46,7 +46,7 @@ class Condition(NamedTuple):
 
 
 class Judged(NamedTuple):
-    """What became of a condition. `value` is nan where no run has the metric; then it cannot be judged and fails."""
+    """Result of a condition. Without a run with the metric, `value` is nan and the condition fails."""
 
     condition: Condition
     value: float
@@ -54,7 +54,7 @@ class Judged(NamedTuple):
 
     @property
     def words(self) -> str:
-        """The outcome in a sentence."""
+        """Result in a sentence."""
         c = self.condition
         if not np.isfinite(self.value):
             return f"--fail-on '{c.text}': no run has {c.metric}, so this cannot be judged"
@@ -63,7 +63,7 @@ class Judged(NamedTuple):
 
 
 def parse(text: str, metrics: Iterable[str]) -> Condition:
-    """Read a condition on one of `metrics`. Raises UserError that says which word is wrong."""
+    """Condition from text, on one of `metrics`. Raises UserError that names the wrong word."""
     match = PATTERN.fullmatch(text[:LONGEST])
     said = f"--fail-on '{text[:LONGEST]}'"
     if match is None:
@@ -82,9 +82,9 @@ def parse(text: str, metrics: Iterable[str]) -> Condition:
 
 
 def judge(condition: Condition, columns: dict[str, np.ndarray], runs: int, regressions: int | None) -> Judged:
-    """Whether the results fulfil the condition. `columns` has metrics (runs,) with nan, and flags of trip and error.
+    """Result of a condition. `columns` has metrics (runs,) with nan, and flags of trip and error.
 
-    Raises UserError where regressions are asked for and there is no baseline.
+    Raises UserError for a condition on regressions without a baseline.
     """
     if condition.metric == REGRESSIONS:
         if regressions is None:
@@ -99,7 +99,7 @@ def judge(condition: Condition, columns: dict[str, np.ndarray], runs: int, regre
 
 
 def statistic(name: str, values: np.ndarray, runs: int) -> float:
-    """One statistic of values (runs,), nan left out; nan where none is left."""
+    """Statistic of values (runs,) without nan; nan where all are nan."""
     if values.dtype == bool:
         values = values[values].astype(float)
     there: Any = values[np.isfinite(values)]

@@ -1,4 +1,4 @@
-"""The pictures of a campaign's report: steps on top of each other, distributions, and metrics along the axes."""
+"""Figures of a campaign report: overlaid steps, distributions, and metrics along the axes."""
 
 import base64
 import io
@@ -15,28 +15,28 @@ from rtctl.loop.fused import Run
 from rtctl.tick import safety
 
 INK, BLUE, RED, GREY, GREEN = "#222222", "#0b62a8", "#b3262e", "#8a8f98", "#2e8b57"
-POINTS = 1200  # of a line
+POINTS = 1200  # most points of a line
 BINS = 40
 MOST_LINES = 40
 
 
 class Line(NamedTuple):
-    """A run of the overlay: s from the start of its reference, and mm."""
+    """Run of the overlay: time in s from the start of its reference, position and error in mm."""
 
     t: np.ndarray
     target: np.ndarray
     position: np.ndarray
-    error: np.ndarray  # of the shaped reference
+    error: np.ndarray  # shaped reference - position
     bad: bool
 
 
 def line(run: Run, bad: bool) -> Line | None:
-    """The running part of a run, from where it began; None where it never ran."""
+    """Line of the part of a run in which the machine ran; None where it never ran."""
     rows = run.rows[run.rows["state"] == safety.RUNNING]
     if len(rows) < 2:
         return None
     machine = run.loop.machine
-    mm = 1000.0 * (machine.metres_per_unit or 1.0)  # thousandths of the unit of an angle
+    mm = 1000.0 * (machine.metres_per_unit or 1.0)  # for an angle: thousandths of its unit
     kept = rows[:: max(1, len(rows) // POINTS)]
     y = kept[machine.signals.position]
     origin = kept["target"][0]
@@ -45,7 +45,7 @@ def line(run: Run, bad: bool) -> Line | None:
 
 
 def overlay(lines: Sequence[Line], title: str) -> Figure:
-    """Position and error of several runs over the time of the reference; the bad ones on top, in red."""
+    """Figure of position and error of several runs over the time of the reference; bad runs in red on top."""
     figure = _figure(9.0, 5.2)
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=[3, 2])
     ordered = sorted(lines, key=lambda one: one.bad)
@@ -73,7 +73,7 @@ def overlay(lines: Sequence[Line], title: str) -> Figure:
 
 
 def distributions(metrics: dict[str, np.ndarray], before: dict[str, np.ndarray]) -> Figure:
-    """A histogram of each metric, with median and 99th percentile; `before` are those of a baseline, as an outline."""
+    """Figure with a histogram of each metric, median and 99th percentile; `before` is a baseline, drawn as outline."""
     columns = min(3, len(metrics))
     lines = -(-len(metrics) // columns)
     figure = _figure(3.1 * columns, 2.3 * lines)
@@ -103,7 +103,7 @@ def distributions(metrics: dict[str, np.ndarray], before: dict[str, np.ndarray])
 
 
 def along(name: str, unit: str, labels: Sequence[Any], groups: Sequence[np.ndarray], metric: str) -> Figure:
-    """Median of a metric along an axis, with the band of 5 to 95 % and the worst run at each value."""
+    """Figure of a metric along an axis: median, band of 5 to 95 % and worst run at each value."""
     figure = _figure(7.2, 2.8)
     axes = figure.subplots()
     numeric = all(isinstance(x, (int, float)) and not isinstance(x, bool) for x in labels)
@@ -132,7 +132,7 @@ def along(name: str, unit: str, labels: Sequence[Any], groups: Sequence[np.ndarr
 
 
 def png(figure: Figure) -> str:
-    """A figure as a PNG in base64, to stand in a page."""
+    """PNG of a figure in base64, for HTML."""
     out = io.BytesIO()
     figure.savefig(out, format="png", metadata={"Software": None})
     return base64.b64encode(out.getvalue()).decode()

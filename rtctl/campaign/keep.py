@@ -1,4 +1,4 @@
-"""Bundles of the runs that are worth a look. They are run once more: on virtual time that gives the same rows."""
+"""Bundles of selected runs, written by a second run: virtual time reproduces the rows."""
 
 from pathlib import Path
 from typing import Any
@@ -21,30 +21,30 @@ FOLDER = "bundles"
 
 
 def worst(plan: Plan, table: pa.Table, by: str, count: int) -> list[int]:
-    """Numbers of the runs that are worst in a metric, the worst first; those without it are left out."""
+    """Numbers of the worst runs by a metric, worst first; runs without the metric are left out."""
     values = METRICS[by].worse * values_of(table, by)
     order = np.argsort(-values, kind="stable")
     return [int(i) for i in order if np.isfinite(values[i])][:count]
 
 
 def values_of(table: pa.Table, name: str) -> np.ndarray:
-    """A metric of all runs (n,), nan where one has none."""
+    """Values (n,) of a metric of all runs, nan for runs without it."""
     return table[name].to_numpy(zero_copy_only=False).astype(float)
 
 
 def flags(table: pa.Table, name: str) -> np.ndarray:
-    """Whether each run (n,) has a text in this column: `trip` or `error`."""
+    """Mask (n,) of runs with a text in the column `trip` or `error`."""
     return np.array([bool(text) for text in table[name].to_pylist()], dtype=bool)
 
 
 def failed(plan: Plan, table: pa.Table) -> np.ndarray:
-    """Whether each run (n,) failed: it could not be run, or it tripped where that is a failure."""
+    """Mask (n,) of failed runs: an error, or a trip where the plan counts it as a failure."""
     found = flags(table, "error")
     return found | flags(table, "trip") if plan.payload["trips"] == "fail" else found
 
 
 def wanted(plan: Plan, table: pa.Table) -> list[int]:
-    """Numbers of the runs that leave a bundle."""
+    """Numbers of the runs that get a bundle."""
     keep = plan.keep
     runnable = ~flags(table, "error")
     if keep.bundles == "none":
@@ -61,7 +61,7 @@ def name_of(run: int) -> str:
 
 
 def write(plan: Plan, number: int, folder: Path) -> Path:
-    """Write the bundle of a run, if it is not there; returns it. Raises UserError where the disk does not take it."""
+    """Write the bundle of a run unless it exists; returns its folder. Raises UserError where a write fails."""
     bundle = folder / FOLDER / name_of(number)
     if (bundle / PARQUET).is_file():
         return bundle
@@ -83,7 +83,7 @@ def write(plan: Plan, number: int, folder: Path) -> Path:
 
 
 def case_of(plan: Plan, number: int, run: Run) -> dict[str, Any]:
-    """case.json of a run: the machine's own, and which run of which campaign it was."""
+    """case.json of a run: the case of its machine, and campaign and run number."""
     case = describe(run.loop.machine, run.loop.made)
     told = {"name": plan.name, "hash": plan.identity, "run": number, **plan.labels(number)}
     return {**case, "complete": True, "campaign": told}

@@ -14,7 +14,7 @@ MOST = 50  # failures in the terminal
 
 
 def listing(plan: Plan, table: pa.Table, folder: Path, count: int, by: str | None = None) -> dict[str, Any]:
-    """Failures and the `count` worst runs by a metric: of each its axes, why or how bad, and its bundle if it has one.
+    """Failures and the `count` worst runs by a metric, each with axes, reason or value, and bundle.
 
     Raises UserError where the campaign has no such metric.
     """
@@ -35,7 +35,7 @@ def listing(plan: Plan, table: pa.Table, folder: Path, count: int, by: str | Non
 
 
 def entry(plan: Plan, table: pa.Table, folder: Path, number: int, by: str) -> dict[str, Any]:
-    """One run in a few words."""
+    """Entry of one run: axes, metric, trip, error and bundle."""
     row = table.slice(number, 1).to_pylist()[0]
     bundle = folder / keep.FOLDER / keep.name_of(number)
     return {
@@ -49,14 +49,14 @@ def entry(plan: Plan, table: pa.Table, folder: Path, number: int, by: str) -> di
 
 
 def axes_words(axes: dict[str, Any]) -> str:
-    """Values of a run's axes in a line."""
+    """Values of a run's axes, as text in one line."""
     return ", ".join(
         f"{name}={value:.6g}" if isinstance(value, float) else f"{name}={value}" for name, value in axes.items()
     )
 
 
 def words(found: dict[str, Any]) -> list[str]:
-    """The list for a terminal."""
+    """Lines of the list for a terminal."""
     lines = [f"{found['campaign']}: {found['runs']} runs, {found['failed']} failed"]
     for e in found["failures"][:MOST]:
         lines.append(f"  run {e['run']:<8}{e['error'] or 'trip: ' + e['trip']}; {axes_words(e['axes'])}")

@@ -1,4 +1,4 @@
-"""What a run of a campaign is judged by: numbers of its steps, its error, its tape and its drives."""
+"""Metrics of a run of a campaign: steps, tracking error, tape tension and drive voltages."""
 
 from collections.abc import Iterable
 from typing import NamedTuple
@@ -30,7 +30,7 @@ METRICS: dict[str, Metric] = {
     "peak_error": Metric("largest of it", "unit", 1),
     "tension_min_N": Metric("lowest tape tension while running", "N", -1),
     "tension_max_N": Metric("highest tape tension while running", "N", 1),
-    "rms_output_V": Metric("rms of what was written to a drive, of the one that had most", "V", 1),
+    "rms_output_V": Metric("largest rms voltage written to a drive", "V", 1),
     "peak_output_V": Metric("largest voltage written to a drive", "V", 1),
     "trip_s": Metric("controller clock at the trip; none for no trip", "s", -1),
 }
@@ -39,10 +39,10 @@ NAN = float("nan")
 
 
 def measure(run: Run, machine: Machine, wanted: Iterable[str] = METRICS) -> dict[str, float]:
-    """The `wanted` metrics of a run, nan where the machine or this run has none.
+    """The `wanted` metrics of a run by name; nan where the machine or this run has none.
 
-    Those of steps judge the measured position by the target, as `rtctl run` does. A run that tripped has none: its
-    steps did not end.
+    Metrics of steps compare the measured position with the target, as `rtctl run` does. A tripped run has no metrics of
+    steps, as its steps did not end.
     """
     rows = run.rows[run.rows["state"] == safety.RUNNING]
     found = dict.fromkeys(METRICS, NAN)
@@ -95,7 +95,7 @@ def _error(rows: np.ndarray, machine: Machine) -> dict[str, float]:
 
 
 def _tension(rows: np.ndarray) -> dict[str, float]:
-    """By the emulator's own tensions where they are recorded, else by the estimates."""
+    """Metrics of tape tension, from the emulator's true tensions where recorded, else from the estimates."""
     names = rows.dtype.names or ()
     pair = next((pair for pair in TENSIONS if pair[0] in names), None)
     if pair is None:

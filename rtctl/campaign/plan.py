@@ -1,4 +1,4 @@
-"""A campaign file made ready: every run by its number, as plain data that any process can take up."""
+"""Plan of a campaign: all runs by number, as plain data for any process."""
 
 import hashlib
 import json
@@ -22,16 +22,16 @@ from rtctl.sources import sources_hash
 from rtctl.trace import metrics as step
 
 MOST_RUNS = 1_000_000
-CHUNKS = 200  # parts of a large campaign, about
-MOST_TICKS = 2_000_000  # of a run: its rows are held in memory
-AFTER = 2.0  # s behind the end of a reference
-Load = Callable[[str, list[str] | None], Any]  # of a config, as rtctl.cli.common.load_config
+CHUNKS = 200  # approximate number of parts of a large campaign
+MOST_TICKS = 2_000_000  # ticks of a run; its rows are held in memory
+AFTER = 2.0  # s after the end of a reference
+Load = Callable[[str, list[str] | None], Any]  # loader of a config, such as rtctl.cli.common.load_config
 
-FIXED = ("run", "trip", "error")  # columns beside axes and metrics
+FIXED = ("run", "trip", "error")  # columns other than axes and metrics
 
 
 class Plan:
-    """All runs of a campaign. `payload` is plain data (JSON): what a worker needs, and what makes it this campaign."""
+    """All runs of a campaign. `payload` is plain data (JSON) for workers; its hash identifies the campaign."""
 
     def __init__(self, payload: dict[str, Any]):
         self.payload = payload
@@ -49,7 +49,7 @@ class Plan:
 
     @cached_property
     def runs(self) -> int:
-        """How many there are."""
+        """Number of runs."""
         count = 1
         for length in self.shape:
             count *= length
@@ -57,12 +57,12 @@ class Plan:
 
     @cached_property
     def identity(self) -> str:
-        """Hash of the campaign: the same runs in the same order."""
+        """Hash of the campaign: equal for equal runs in equal order."""
         return hashlib.sha256(json.dumps(self.payload, sort_keys=True).encode()).hexdigest()
 
     @property
     def chunk(self) -> int:
-        """Runs in a part of the results, whoever computes it."""
+        """Number of runs in a part of the results."""
         return min(max(-(-self.runs // CHUNKS), 1), 1000)
 
     @property
@@ -70,11 +70,11 @@ class Plan:
         return -(-self.runs // self.chunk)
 
     def numbers(self, chunk: int) -> range:
-        """Runs of a chunk."""
+        """Numbers of the runs of a chunk."""
         return range(chunk * self.chunk, min((chunk + 1) * self.chunk, self.runs))
 
     def at(self, run: int) -> list[int]:
-        """Place of a run on each axis; the last one is the fastest."""
+        """Index of a run on each axis; the last axis varies fastest."""
         places = []
         for length in reversed(self.shape):
             run, place = divmod(run, length)
@@ -82,30 +82,30 @@ class Plan:
         return places[::-1]
 
     def labels(self, run: int) -> dict[str, Any]:
-        """What the table shows of each axis."""
+        """Label of a run on each axis, for the table."""
         pairs = zip(self.axes, self.at(run), strict=True)
         return {column["name"]: column["labels"][place] for axis, place in pairs for column in axis}
 
     def changes(self, run: int) -> dict[str, Any]:
-        """Dotted path of a setting -> its value in this run, `config` among them."""
+        """Dotted path of a setting -> its value in this run, including `config`."""
         pairs = zip(self.axes, self.at(run), strict=True)
         return {path: c["values"][place] for axis, place in pairs for c in axis for path in c["paths"]}
 
     def config(self, run: int) -> Any:
-        """Settings of a run. Raises UserError where a value does not fit."""
+        """Settings of a run. Raises UserError for an invalid value."""
         changes = self.changes(run)
         base = self.base(changes.pop(CONFIG, next(iter(self.payload["bases"]))))
         return set_paths(base, changes)
 
     def base(self, name: str) -> Any:
-        """Settings that runs start from."""
+        """Base settings of the runs with config `name`."""
         if name not in self._bases:
             data = self.payload["bases"][name]
             self._bases[name] = machines.settings(data)
         return self._bases[name]
 
     def ticks(self, machine: Any) -> int:
-        """Length of a run. Raises UserError for more than fit into memory."""
+        """Length of a run in ticks. Raises UserError above MOST_TICKS."""
         seconds = self.payload["seconds"]
         if seconds is None:
             table = machine.reference
@@ -117,7 +117,7 @@ class Plan:
 
     @cached_property
     def schema(self) -> pa.Schema:
-        """Columns of the results."""
+        """Arrow schema of the results."""
         fields = [pa.field("run", pa.int64(), nullable=False)]
         fields += [
             pa.field(name, _kind(labels), metadata={"unit": self.units[name]}) for name, labels in self.columns.items()
@@ -141,7 +141,7 @@ def _kind(labels: list[Any]) -> pa.DataType:
 
 
 def find_campaign(name: str) -> Path:
-    """The file: as given, or among the campaigns that come with rtctl. Raises UserError."""
+    """Path of a campaign file: as given, or among the campaigns of rtctl. Raises UserError."""
     shipped = Path(str(resources.files("rtctl.configs"))) / "campaigns"
     for place in (Path(name), Path(f"{name}.yaml"), shipped / name, shipped / f"{name}.yaml"):
         try:
@@ -153,10 +153,10 @@ def find_campaign(name: str) -> Path:
 
 
 def load_plan(name: str, load: Load, seconds: float | None = None) -> Plan:
-    """The plan of a campaign file; `load` reads configs, `seconds` is instead of what the file says.
+    """Plan from a campaign file; `load` reads configs, `seconds` replaces the length in the file.
 
-    A machine's config is a campaign of one run, so the experiment that `rtctl diagnose` proposes can be run as it is.
-    Raises UserError with file, line and key.
+    A machine's config is a campaign of one run: an experiment proposed by `rtctl diagnose` runs unchanged. Raises
+    UserError with file, line and key.
     """
     path = find_campaign(name)
     document = load_yaml(path)
@@ -198,7 +198,7 @@ def load_plan(name: str, load: Load, seconds: float | None = None) -> Plan:
 
 
 def sources() -> str:
-    """Hash of all that a row comes from: the tick's sources, and what measures a run."""
+    """Hash of the sources that determine a row: those of the tick and of the metrics."""
     digest = hashlib.sha256(sources_hash().encode())
     for path in (Path(step.__file__ or ""), *(Path(__file__).with_name(name) for name in ("metrics.py", "cell.py"))):
         digest.update(path.read_bytes())
@@ -206,7 +206,7 @@ def sources() -> str:
 
 
 def _configs(settings: CampaignSettings, where: Any) -> list[str]:
-    """Configs that runs start from: the one of the file, or those of an axis called `config`."""
+    """Names of base configs: the config of the file, or the values of an axis `config`."""
     given = settings.matrix.get(CONFIG)
     if given is None:
         return [settings.config]
@@ -216,7 +216,7 @@ def _configs(settings: CampaignSettings, where: Any) -> list[str]:
 
 
 def _base(settings: CampaignSettings, name: str, where: Any, near: Any, load: Load) -> Any:
-    """A machine's settings with what all runs change. Raises UserError."""
+    """Settings of a machine with the changes of `set`. Raises UserError."""
     try:
         config = load(str(near(name)), None)
     except UserError as error:
@@ -239,7 +239,7 @@ def _base(settings: CampaignSettings, name: str, where: Any, near: Any, load: Lo
 
 
 def _check_columns(axes: list[Axis], where: Any) -> None:
-    """No two axes may change the same setting, or be called alike."""
+    """Raise UserError where two axes change one setting or have one name."""
     names: set[str] = {*METRICS, *FIXED}
     taken: dict[str, str] = {}
     for axis in axes:

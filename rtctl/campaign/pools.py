@@ -1,6 +1,6 @@
-"""Where the chunks of a campaign are computed: in this process, in a pool of them here, or by a Dask scheduler.
+"""Execution of the chunks of a campaign: in this process, in a local pool of processes, or by a Dask scheduler.
 
-All three give the same rows: a chunk depends on the plan and its number only.
+All three give equal rows: a chunk depends only on the plan and its number.
 """
 
 from collections.abc import Iterable, Iterator
@@ -10,13 +10,13 @@ from rtctl import workers
 from rtctl.campaign import cell
 from rtctl.campaign.plan import Plan
 
-MOST, TASKS = 5, 40  # chunks of a task of Dask, where so many tasks are left at least
+MOST, TASKS = 5, 40  # most chunks of a Dask task, and the number of tasks below which tasks get smaller
 
 Done = Iterator[tuple[int, list[dict[str, Any]]]]  # chunk, its rows
 
 
 def compute(plan: Plan, chunks: Iterable[int], jobs: int, scheduler: str | None) -> Done:
-    """Rows of each chunk, as they are done. Raises UserError where there is no such scheduler, PoolError."""
+    """Rows of each chunk, in order of completion. Raises UserError for an unreachable scheduler, PoolError."""
     if scheduler is not None:
         left = list(chunks)
         together = min(MOST, max(1, len(left) // TASKS))
@@ -30,7 +30,7 @@ def _here(plan: Plan, chunks: Iterable[int]) -> Done:
 
 
 def _local(plan: Plan, chunks: list[int], jobs: int) -> Done:
-    """A pool of processes. The first run is compiled here, so that they need not all do it."""
+    """Rows of each chunk from a local pool. The first run compiles here, and the workers use its cache."""
     if chunks:
         cell.run_row(plan, plan.numbers(chunks[0])[0])
     yield from workers.local(cell.run_chunk, chunks, jobs, plan.payload, plan.identity)

@@ -1,4 +1,4 @@
-"""The report of a campaign: one HTML file that needs nothing but the bundles beside it, and those only to click on."""
+"""Report of a campaign: one self-contained HTML file with links to the bundles beside it."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -20,16 +20,16 @@ from rtctl.config.errors import NoAnswer, UserError
 from rtctl.config.files import write_text
 
 REPORT = "report.html"
-MOST_ROWS = 12  # of an axis's table; a longer axis is cut into that many pieces
-MOST_LISTED = 100  # failures and regressions
-OVERLAYS = 3  # configs whose steps are drawn
+MOST_ROWS = 12  # rows in the table of an axis; a longer axis is cut into this many sections
+MOST_LISTED = 100  # listed failures and regressions
+OVERLAYS = 3  # most configs with drawn steps
 WORST = 10
 RULE = (
-    f"Runs that differ in loop.seed only are a group. With {LEAST} of them or more it is a regression where the mean "
-    f"difference is worse than Student's t gives it for noise (one chance in {1 / LEVEL:.0f} that noise marks anything "
-    f"in the whole comparison) and more than {100 * SMALL:.0f} % of the baseline; with fewer, nobody knows the noise, "
-    f"and it is one above {100 * UNKNOWN:.0f} %. A run that fails and did not fail before is a regression, "
-    "and so is one that has lost a metric, such as a step that does not settle any more."
+    f"Runs that differ only in loop.seed are a group. A group of {LEAST} or more runs is a regression where the mean "
+    f"difference is significantly worse by Student's t (familywise error rate {100 * LEVEL:.0f} % for the whole "
+    f"comparison) and more than {100 * SMALL:.0f} % of the baseline. A smaller group, whose noise is unknown, is a "
+    f"regression above {100 * UNKNOWN:.0f} %. A run that newly fails is a regression, "
+    "and so is a run that lost a metric, such as a step that no longer settles."
 )
 
 
@@ -46,7 +46,7 @@ def write(
     compared: Comparison | None = None,
     judged: Sequence[Judged] = (),
 ) -> Path:
-    """Write report.html into the campaign's folder; its path. Raises UserError where the disk does not take it."""
+    """Write report.html into the campaign's folder; returns its path. Raises UserError where the write fails."""
     path = folder / REPORT
     try:
         write_text(path, html(plan, table, bundles, compared, judged))
@@ -62,7 +62,7 @@ def html(
     compared: Comparison | None = None,
     judged: Sequence[Judged] = (),
 ) -> str:
-    """The report as one text."""
+    """HTML text of the report."""
     env = Environment(
         loader=PackageLoader("rtctl.campaign", "."), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )
@@ -89,7 +89,7 @@ def html(
 
 
 def verdict(plan: Plan, bad: np.ndarray, judged: Sequence[Judged], compared: Comparison | None) -> str:
-    """What came of it, in a sentence or two."""
+    """Verdict of the campaign in one to three sentences."""
     words = [f"{len(bad)} runs, {int(bad.sum()) or 'none'} failed."]
     hit = sum(j.failed for j in judged)
     if judged:
@@ -100,14 +100,14 @@ def verdict(plan: Plan, bad: np.ndarray, judged: Sequence[Judged], compared: Com
 
 
 def statistics(name: str, x: np.ndarray) -> list[str]:
-    """Row of the table of metrics."""
+    """Row of a metric in the table of metrics."""
     metric = METRICS[name]
     numbers = [conditions.statistic(s, x, len(x)) for s in ("min", "median", "p90", "p99", "max")]
     return [f"{name}", metric.words, *(f"{v:.4g}" for v in numbers), str(int(np.isfinite(x).sum()))]
 
 
 def overlays(plan: Plan, table: pa.Table, bad: np.ndarray) -> list[Picture]:
-    """Steps on top of each other, a picture for each config: some runs evenly chosen, and those that are worst."""
+    """Overlaid steps, one picture for each config: evenly spaced runs and the worst runs."""
     groups: dict[str, list[int]] = {}
     configs = table["config"].to_pylist() if "config" in plan.columns else [""] * len(table)
     for number, config in enumerate(configs):
@@ -132,7 +132,7 @@ def _line(plan: Plan, number: int, bad: bool) -> figures.Line | None:
 
 
 def distributions(values: dict[str, np.ndarray], compared: Comparison | None) -> Picture | None:
-    """Histograms of all metrics."""
+    """Picture of the histograms of all metrics."""
     if not values:
         return None
     before = {}
@@ -143,14 +143,14 @@ def distributions(values: dict[str, np.ndarray], compared: Comparison | None) ->
 
 
 def failure(plan: Plan, table: pa.Table, number: int, bundles: Mapping[int, Path]) -> dict[str, Any]:
-    """A run that failed."""
+    """Entry of a failed run."""
     row = table.slice(number, 1).to_pylist()[0]
     why = row["error"] or f"trip: {row['trip']}"
     return {**_entry(plan, row, number, bundles), "why": why}
 
 
 def worst(plan: Plan, table: pa.Table, number: int, bundles: Mapping[int, Path]) -> dict[str, Any]:
-    """One of the worst runs."""
+    """Entry of one of the worst runs."""
     row = table.slice(number, 1).to_pylist()[0]
     return {**_entry(plan, row, number, bundles), "value": f"{row[plan.keep.by]:.5g}", "trip": row["trip"]}
 
@@ -161,13 +161,13 @@ def _entry(plan: Plan, row: dict[str, Any], number: int, bundles: Mapping[int, P
 
 
 def has_order(plan: Plan, index: int) -> bool:
-    """Whether an axis is worth a table: one value says nothing, and seeds are noise."""
+    """Whether an axis gets a table: it has several values and they are no seeds."""
     paths = [path for column in plan.axes[index] for path in column["paths"]]
     return plan.shape[index] > 1 and paths != [SEED]
 
 
 def axis_table(plan: Plan, table: pa.Table, index: int, values: Mapping[str, np.ndarray], bad: np.ndarray) -> Any:
-    """An axis: a row for each of its values, or for pieces of it, and a picture of the metric that counts."""
+    """Table of an axis, with a row for each value or section, and a picture of the metric `keep.by`."""
     axis, by = plan.axes[index], plan.keep.by
     stride = int(np.prod(plan.shape[index + 1 :], dtype=int))
     places = np.arange(plan.runs) // stride % plan.shape[index]
@@ -187,7 +187,7 @@ def axis_table(plan: Plan, table: pa.Table, index: int, values: Mapping[str, np.
 
 
 def _span(axis: Any, piece: np.ndarray) -> str:
-    """First to last value of a piece of an axis, of each of its columns."""
+    """First and last value of a section of an axis, for each column."""
     said = []
     for column in axis:
         ends = [column["labels"][i] for i in dict.fromkeys((int(piece[0]), int(piece[-1])))]
@@ -205,7 +205,7 @@ def _three(values: Mapping[str, np.ndarray], by: str, mine: np.ndarray) -> list[
 
 
 def comparison(compared: Comparison, plan: Plan) -> dict[str, Any]:
-    """Changes against the baseline: a line for each metric, and the groups that got worse."""
+    """Changes against the baseline: a row for each metric, and the groups that got worse."""
     worse, better = compared.of(WORSE), compared.of(BETTER)
     metrics = []
     for name in dict.fromkeys(c.metric for c in compared.changes):
@@ -236,5 +236,5 @@ def _change_row(c: Change) -> list[str]:
 
 
 def number(value: float, form: str = ".5g") -> str:
-    """A number in a table; "none" for what no run has."""
+    """Text of a number in a table; "none" for nan."""
     return format(value, form) if np.isfinite(value) else "none"

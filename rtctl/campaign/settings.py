@@ -1,4 +1,4 @@
-"""What a person writes in a campaign file, and how its axes become lists of values.
+"""Settings of a campaign file and of its axes.
 
 campaign: radii
 config: ivu
@@ -19,7 +19,7 @@ from rtctl.campaign.metrics import METRICS
 from rtctl.config.errors import nearest
 from rtctl.idiom import Settings, quantity
 
-MOST_VALUES = 100_000  # of an axis
+MOST_VALUES = 100_000  # most values of an axis
 
 
 def _check_metric(name: str, key: str) -> None:
@@ -30,11 +30,11 @@ def _check_metric(name: str, key: str) -> None:
 
 
 class KeepSettings(Settings):
-    """Which runs leave a bundle. They are run once more for it: on virtual time that gives the same rows."""
+    """Runs that get a bundle, written by a second run: virtual time reproduces the rows."""
 
     bundles: Literal["some", "all", "none"] = Field(default="some", description="some: the two numbers below")
     worst: int = Field(default=5, ge=0, le=1000, description="bundles of the runs with the largest `by`")
-    by: str = Field(default="final_error_mm", description="metric that the worst runs are the worst in")
+    by: str = Field(default="final_error_mm", description="metric that selects the worst runs")
     failures: int = Field(default=20, ge=0, le=1000, description="bundles of runs that tripped, at most")
 
     @model_validator(mode="after")
@@ -44,7 +44,7 @@ class KeepSettings(Settings):
 
 
 class AxisSettings(Settings):
-    """One axis of the matrix. Its key is the dotted path of a setting, or a name where `paths` or `together` say more.
+    """Axis of the matrix. Its key is the dotted path of a setting, or a name where `paths` or `together` are given.
 
     Exactly one of `values`, `range`, `linspace`, `random` and `together`.
     """

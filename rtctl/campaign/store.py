@@ -1,8 +1,8 @@
-"""The folder of a campaign: what it is, the rows so far, and at its end the table of all.
+"""Folder of a campaign: plan, finished rows, and the table of all rows at the end.
 
 campaign.json             the plan, with a hash
-parts/part-000012.parquet the rows of a chunk; each is there whole or not at all
-results.parquet           all rows, in the order of their numbers
+parts/part-000012.parquet the rows of a chunk, written atomically
+results.parquet           all rows, in order of run numbers
 report.html  bundles/     see rtctl.campaign.report and .keep
 """
 
@@ -23,7 +23,7 @@ IDENTITY = b"campaign"  # key in the metadata of a part
 
 
 class Store:
-    """The folder of a campaign that is being run. Raises UserError where it holds another one."""
+    """Folder of a running campaign. Raises UserError where it holds another campaign."""
 
     def __init__(self, folder: Path, plan: Plan):
         self.folder, self.plan = folder, plan
@@ -43,23 +43,23 @@ class Store:
         return self.folder / PARTS / f"part-{chunk:06d}.parquet"
 
     def done(self) -> set[int]:
-        """Chunks whose rows are here."""
+        """Chunks with stored rows."""
         if self.finished():
             return set(range(self.plan.chunks))
         return {chunk for chunk in range(self.plan.chunks) if self._whole(chunk)}
 
     def _whole(self, chunk: int) -> bool:
-        """Whether all rows of a chunk are here, and no others."""
+        """Whether the part of a chunk holds exactly its rows."""
         table = self._load(self._part(chunk))
         return table is not None and table["run"].to_pylist() == list(self.plan.numbers(chunk))
 
     def finished(self) -> bool:
-        """Whether the table of all is here."""
+        """Whether the table of all rows exists."""
         table = self._load(self.folder / RESULTS)
         return table is not None and len(table) == self.plan.runs
 
     def _load(self, path: Path) -> pa.Table | None:
-        """Rows of a file of this campaign; None where it is missing or damaged: then they are computed again."""
+        """Rows of a file of this campaign; None for a missing or damaged file, whose rows are computed again."""
         try:
             table = pq.read_table(path)
         except (OSError, pa.ArrowException):
@@ -68,17 +68,17 @@ class Store:
         return table if mine else None
 
     def add(self, chunk: int, rows: list[dict[str, Any]]) -> None:
-        """Keep the rows of a chunk. Raises UserError where the disk does not take them."""
+        """Write the rows of a chunk. Raises UserError where the write fails."""
         table = pa.Table.from_pylist([self._typed(row) for row in rows], schema=self.schema)
         self._save(table, self._part(chunk))
 
     def _typed(self, row: dict[str, Any]) -> dict[str, Any]:
-        """Labels of several kinds in one column are text."""
+        """Row with text labels in columns of mixed types."""
         texts = (f.name for f in self.schema if pa.types.is_string(f.type))
         return {**row, **{name: _text(row[name]) for name in texts}}
 
     def finish(self) -> pa.Table:
-        """Make one table of all parts; returns it."""
+        """Write the table of all parts; returns it."""
         if not self.finished():
             parts = [self._load(self._part(chunk)) for chunk in range(self.plan.chunks)]
             self._save(pa.concat_tables([part for part in parts if part is not None]), self.folder / RESULTS)
@@ -95,7 +95,7 @@ class Store:
 
 
 def load_results(folder: Path | str) -> tuple[Plan, pa.Table]:
-    """Plan and table of a finished campaign. Raises UserError where the folder holds none."""
+    """Plan and table of a finished campaign. Raises UserError where the folder holds no finished campaign."""
     folder = Path(folder)
     if not (folder / CAMPAIGN).is_file():
         raise UserError(f"{folder}: is not the folder of a campaign, there is no {CAMPAIGN}; see rtctl campaign run")
@@ -123,7 +123,7 @@ def _read(path: Path) -> dict[str, Any]:
 
 
 def _same(folder: Path, held: dict[str, Any], plan: Plan) -> None:
-    """Raises UserError where the folder's campaign is not this one, with what differs."""
+    """Raise UserError with the differences where the folder holds another campaign."""
     if held.get("hash") == plan.identity:
         return
     words = {"sources": "version of rtctl", "bases": "config", "axes": "matrix"}

@@ -1,4 +1,4 @@
-"""Experiments: what the data of a run say of the machine. Each is a function of a record and a config that plays it."""
+"""Identification experiments: each has a function on a record, and a config that plays its motion."""
 
 from rtctl.callable_module import called
 

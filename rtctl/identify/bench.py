@@ -1,7 +1,7 @@
-"""What bench experiments share: a config changed, and played on virtual time into a record.
+"""Common functions of bench experiments: changes of a config, and its run on virtual time into a record.
 
-Each experiment is a pure function on a record or on arrays. Those that need a motion of their own have a function that
-gives the config to play: `play` plays it in this process, `rtctl run` on a bench.
+Each experiment is a pure function on a record or on arrays. Experiments with a motion of their own have a function that
+returns the config to play: `play` runs it in this process, `rtctl run` on a bench.
 """
 
 from collections.abc import Mapping
@@ -16,14 +16,14 @@ from rtctl.identify.records import Record, take
 from rtctl.machines.profile import REELS
 from rtctl.machines.profiles import kinds_with, profile_of
 
-ARMING = {"given": 1.0, "measured": 14.0}  # s, by where the radii come from
-REST = 0.5  # s, behind the end of the reference
+ARMING = {"given": 1.0, "measured": 14.0}  # s, by the source of the radii
+REST = 0.5  # s, after the end of the reference
 
 
 def changed(config: Any, changes: Mapping[str, Any]) -> Any:
-    """The config with other values at dotted keys, which leaves no excitation but one that `changes` asks for.
+    """Config with `changes` at dotted keys; the excitation is off unless `changes` sets it.
 
-    Raises UserError where the machine does not know a key or the value is out of bounds.
+    Raises UserError for an unknown key or a value out of bounds.
     """
     return set_paths(config, {"excitation": {"kind": "none"}, **changes})
 
@@ -35,7 +35,7 @@ def need(machine: str, name: str, *traits: str) -> None:
 
 
 def seconds(config: Any) -> float:
-    """How long a config plays from the first tick on until its reference has ended."""
+    """Duration in s of a config from the first tick to the end of its reference."""
     reference, end, at = config.reference, 0.0, 0.0
     for step in reference.steps:
         end, at = step.at + (abs(step.to - at) / step.ramp if step.ramp else 0.0), step.to
@@ -45,7 +45,7 @@ def seconds(config: Any) -> float:
 
 
 def arming(config: Any) -> float:
-    """s, at most, until the reference plays."""
+    """Longest time in s until the reference starts."""
     return ARMING[config.radius.source if profile_of(config.kind).has(REELS) else "given"]
 
 
@@ -64,14 +64,14 @@ def play(config: Any, length: float | None = None) -> Record:
 
 
 def whole(record: Record) -> Record:
-    """The record, unless the machine tripped in it: then raise NoAnswer with the time."""
+    """The record unchanged. Raises NoAnswer with the time where the machine tripped."""
     if record.trip:
         raise NoAnswer(f"{record.source}: the run tripped, {record.trip} at {record.trip_time:.3f} s")
     return record
 
 
 def ramps(t: np.ndarray, ref: np.ndarray, least: float) -> list[tuple[int, int]]:
-    """Stretches [begin, end) of at least `least` s in which the reference `ref` (n,) moves at one speed."""
+    """Row intervals [begin, end) of at least `least` s in which the reference `ref` (n,) has constant speed."""
     slope = np.diff(ref) / np.diff(t)
     fastest = np.abs(slope).max(initial=0.0)
     if fastest == 0.0:
@@ -82,7 +82,7 @@ def ramps(t: np.ndarray, ref: np.ndarray, least: float) -> list[tuple[int, int]]
 
 
 def counts_per_turn(record: Record) -> int:
-    """Of the encoder on the capstan."""
+    """Counts per turn of the encoder on the capstan."""
     found = profile_of(record.kind).encoder
     assert found is not None
     encoder = found(record.config)

@@ -1,4 +1,4 @@
-"""Pictures of the bench experiments: 8.4, 8.6, 11.6 to 11.10 and 12.3 of the thesis, from our own data."""
+"""Figures of the bench experiments: 8.4, 8.6, 11.6 to 11.10 and 12.3 of the thesis, from rtctl records."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -41,13 +41,13 @@ def friction(result: Friction) -> Figure:
 
 
 def curve(fit: Stribeck, v: np.ndarray) -> np.ndarray:
-    """(8.3) at speeds `v` (n,) in rad/s; without the fall where the fit has none."""
+    """Friction (n,) by (8.3) at speeds `v` (n,) in rad/s; without Stribeck term where the fit has none."""
     F = fit.F_C + fit.F_v * v
     return F if fit.F_S is None or fit.v_s is None else F + (fit.F_S - fit.F_C) * np.exp(-((v / fit.v_s) ** 2))
 
 
 def radius(record: Record) -> Figure:
-    """Both radii by (5.2) as the capstan turns, with the accuracy of (5.3) as a band."""
+    """Figure of both radii by (5.2) over the capstan angle, with the accuracy (5.3) as a band."""
     figure, (axes,) = _panels("Reel radii by (5.2)", 1)
     phi, config = record["capstan"], record.config
     way = np.abs(phi - phi[0])
@@ -82,7 +82,7 @@ def driver(result: DriverCurve) -> Figure:
 
 
 def scale(one: Pass, trend: ScaleError, spectrum: Spectrum, peaks: Sequence[Peak]) -> Figure:
-    """Figures 11.6 and 11.7: the error with its trend, without, and its Fourier transform on two scales."""
+    """Figures 11.6 and 11.7: position error with and without trend, and its Fourier transform on two scales."""
     figure, axes = _panels("Position error, scale less encoder", 4)
     x, e = envelope(one.x, one.e)
     axes[0].plot(1e3 * x, 1e3 * e, color=BLUE, linewidth=1.1, label="error")
@@ -125,7 +125,7 @@ def luminance(image: Image, cross: Cross, band: Band) -> Figure:
 
 
 def steps(records: Sequence[Record], columns: Sequence[str], labels: Sequence[str]) -> Figure:
-    """Figure 8.6 and the printing steps: position and reference, one panel a record."""
+    """Figure 8.6 and the printing steps: position and reference, one panel for each record."""
     figure, axes = _panels("Step responses", len(records))
     for one, record, column, label in zip(axes, records, columns, labels, strict=True):
         t = record.t - record.t[0]

@@ -3,11 +3,11 @@
     G_m = mean of Y/W over periods / mean of U/W over periods                  one realisation of the phases
     G   = mean of Y/W / mean of U/W over realisations                          best linear approximation
     noise  from period to period      total  from realisation to realisation
-    odd    = sqrt(total^2 - noise^2)  even = lines that were not excited, less what the loop fed back there
+    odd    = sqrt(total^2 - noise^2)  even = lines without excitation, less the feedback of the loop
 
-A period holds a whole number of cycles of every line, so there is no leakage and no window. The excitation W is what is
-known exactly; as the input and the output are both projected on it, feedback of noise does no harm. Distortions of odd
-order fall on the excited lines and change with the phases, those of even order fall between them.
+A period holds a whole number of cycles of every line: there is no leakage and no window. The excitation W is known
+exactly. Input and output are projected on W, so noise in the feedback causes no bias. Distortions of odd order fall on
+the excited lines and change with the phases. Distortions of even order fall between the excited lines.
 
 Source: Pintelon & Schoukens, System Identification (2012), chapters 2 (periodic, in feedback) and 4 (odd multisines).
 """
@@ -22,19 +22,19 @@ from rtctl.identify.frf import Frf, carried, motor_of, radii
 from rtctl.identify.records import Record, check, steady, take_all
 from rtctl.machines.profile import REELS
 
-SMOOTH = 4  # neighbours on either side over which a variance is averaged: few realisations tell little of it
+SMOOTH = 4  # neighbours on either side in the average of a variance; few realisations estimate it poorly
 
 
 class BestLinear(NamedTuple):
-    f: np.ndarray  # (n,) Hz, excited lines that the data carry
+    f: np.ndarray  # (n,) Hz, excited lines with sufficient accuracy
     G: np.ndarray  # (n,) complex, rad/V or m/V, hold and delay included
     noise: np.ndarray  # (n,) standard deviation of G by noise, root of E|dG|^2
-    total: np.ndarray  # (n,) standard deviation of G by noise and by distortion, of the mean over realisations
+    total: np.ndarray  # (n,) standard deviation of G, mean over realisations, by noise and distortion
     odd: np.ndarray  # (n,) level of odd distortion in one realisation, rad/V or m/V
-    f_even: np.ndarray  # (m,) Hz, lines that were left out
-    even: np.ndarray  # (m,) level of even distortion, rad/V or m/V, as if it had been excited like its neighbours
+    f_even: np.ndarray  # (m,) Hz, lines without excitation
+    even: np.ndarray  # (m,) level of even distortion, rad/V or m/V, per input of the neighbouring lines
     realisations: int
-    periods: int  # in each
+    periods: int  # in each realisation
     frf: Frf
 
 
@@ -45,37 +45,37 @@ class _Realisation(NamedTuple):
     excited: np.ndarray  # (n,) bool
     Y: np.ndarray  # (p, n)
     U: np.ndarray  # (p, n)
-    leg: np.ndarray  # (p,) number of the stretch
+    leg: np.ndarray  # (p,) number of the leg of each period
     radii: tuple[float, float]
 
     def scatter(self, V: np.ndarray) -> np.ndarray:
-        """Variance (n,) of the mean of V (p, n) over the periods, from their scatter within each leg."""
+        """Variance (n,) of the mean of V (p, n) over the periods, from the scatter within each leg."""
         legs = np.unique(self.leg)
         off = V - np.stack([V[self.leg == i].mean(0) for i in legs])[np.searchsorted(legs, self.leg)]
         return (np.abs(off) ** 2).sum(0) / (len(V) - len(legs)) / len(V)
 
 
 def identify(sources: Sequence[Any] | Any, band: tuple[float, float] | None = None) -> BestLinear:
-    """Best linear approximation from one record a realisation, all with the same period, band and rms.
+    """Best linear approximation from one record for each realisation, all with the same period, band and rms.
 
-    Each record holds one or more stretches at constant speed of at least three periods, the first of which is left
-    to the transient. Raises NoAnswer: too short, fewer than two realisations, drive saturated, trip, unstable loop,
-    band not carried; UserError where the records do not go together.
+    Each record holds one or more legs at constant speed of at least three periods; the first period is discarded for
+    the transient. Raises NoAnswer: too short, fewer than two realisations, drive saturated, trip, unstable loop,
+    band too inaccurate; UserError for records of different machines or settings.
     """
     records = take_all(sources)
     n, motor = _together(records)
     parts = [_realisation(record, n, motor) for record in records]
     if len(parts) < 2:
         raise NoAnswer(
-            f"{records[0].source}: one realisation does not tell distortion from the response; record at least two, "
+            f"{records[0].source}: one realisation does not separate distortion from the response; record at least two "
             "with another excitation.seed each"
         )
     f, on = parts[0].f, parts[0].excited
     y, u = (np.array([x[:, on].mean(0) for x in spectra]) for spectra in ([p.Y for p in parts], [p.U for p in parts]))
     G = y.mean(0) / u.mean(0)
     count = len(parts)
-    away = (y - G * u) / u.mean(0)  # first order of G_m - G, without the bias of a ratio
-    size2 = np.abs(G) ** 2  # relative variances are level, so their neighbours are worth as much
+    away = (y - G * u) / u.mean(0)  # G_m - G to first order, which has no bias of a ratio
+    size2 = np.abs(G) ** 2  # relative variances vary slowly, so neighbours can be averaged
     total2 = size2 * _smooth((np.abs(away) ** 2).sum(0) / (count - 1) / count / size2)
     noise2 = size2 * _smooth(_noise(parts, G, u.mean(0)) / size2)
     total2 = np.maximum(total2, noise2)
@@ -91,7 +91,7 @@ def identify(sources: Sequence[Any] | Any, band: tuple[float, float] | None = No
 
 
 def _together(records: list[Record]) -> tuple[int, int]:
-    """Samples in a period and the motor that pulls. Raises UserError where the records do not go together."""
+    """Samples in a period, and the driving motor. Raises UserError for records of different machines or settings."""
     first = records[0]
     for record in records:
         e = record.config.excitation
@@ -113,7 +113,7 @@ def _together(records: list[Record]) -> tuple[int, int]:
 def _realisation(record: Record, n: int, motor: int) -> _Realisation:
     legs = []
     for s in steady(record, 0.0):
-        periods = (s.stop - s.start) // n - 1  # the first is left to the transient
+        periods = (s.stop - s.start) // n - 1  # without the first period, for the transient
         if periods >= 2:
             legs.append(slice(s.stop - periods * n, s.stop))
     check(record, legs)
@@ -143,16 +143,16 @@ def _realisation(record: Record, n: int, motor: int) -> _Realisation:
 
 
 def _input(record: Record, motor: int) -> np.ndarray:
-    """What was written to the drive, V, with the sign of the command: so rounding and limits are part of the input."""
+    """Voltage (n,) written to the drive, V, with the sign of the command; includes rounding and limits."""
     if not record.profile.has(REELS):
         return record["u"]
     return record["u1"] if motor == 1 else -record["u2"]
 
 
 def _periods(x: np.ndarray, k: int) -> np.ndarray:
-    """Spectra (k, n/2 + 1) of `k` periods, the drift over all of them taken out."""
+    """Spectra (k, n/2 + 1) of `k` periods, without the linear drift."""
     n = len(x) // k
-    drift = np.mean(x[n:] - x[:-n]) / n  # a line through all samples would tilt what is periodic as well
+    drift = np.mean(x[n:] - x[:-n]) / n  # a fitted line would also remove part of the periodic signal
     return np.fft.rfft((x - drift * np.arange(len(x))).reshape(k, n), axis=1) / n
 
 
@@ -163,10 +163,10 @@ def _noise(parts: list[_Realisation], G: np.ndarray, u: np.ndarray) -> np.ndarra
 
 
 def _even(parts: list[_Realisation], G: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Level at the lines left out, less noise and what the loop fed back, over the input at the excited lines."""
+    """Frequencies and even distortion: level of lines without excitation, less noise and feedback, over the input."""
     on, f = parts[0].excited, parts[0].f
     off = ~on
-    level = G * f[on] ** 2  # level enough to be interpolated
+    level = G * f[on] ** 2  # G f^2 varies slowly enough for interpolation
     G_off = (np.interp(f[off], f[on], level.real) + 1j * np.interp(f[off], f[on], level.imag)) / f[off] ** 2
     powers = []
     for p in parts:
@@ -180,7 +180,7 @@ def _even(parts: list[_Realisation], G: np.ndarray, u: np.ndarray) -> tuple[np.n
 
 
 def _smooth(x: np.ndarray) -> np.ndarray:
-    """Mean over SMOOTH neighbours on either side, fewer at the ends."""
+    """Moving mean over SMOOTH neighbours on either side, fewer at the ends."""
     k = min(SMOOTH, (len(x) - 1) // 2)
     total = np.cumsum(np.concatenate(([0.0], x)))
     low = np.maximum(np.arange(len(x)) - k, 0)
@@ -196,7 +196,7 @@ def _carried(record: Record, frf: Frf, band: tuple[float, float] | None) -> np.n
     bad = np.flatnonzero(inside & ~good)
     if (band is not None and len(bad) > 0.05 * inside.sum()) or (good & inside).sum() < 5:
         raise NoAnswer(
-            f"{record.source}: the response is not known to within a half from {frf.f[bad[0]]:.3g} to "
+            f"{record.source}: the deviation of the response is above 50 % from {frf.f[bad[0]]:.3g} to "
             f"{frf.f[bad[-1]]:.3g} Hz; take more excitation, more periods or more realisations"
         )
     return inside & good

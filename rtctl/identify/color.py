@@ -1,18 +1,18 @@
-"""Colour of a printed grey image over the position, and its difference to what was meant: CIE 1976 L*a*b*.
+"""Colour of a printed grey image over position, and colour difference dE to the mean: CIE 1976 L*a*b*.
 
-Four inks are printed by nozzles that stand `lead` apart along the carriage's way, so the lines of each meet the
-position error at another place. Where its lines lie closer, an ink covers more of the paper:
+Four inks are printed by heads at different places along the travel of the carriage: each ink meets the position error
+at another position. Where its lines lie closer, an ink covers more of the paper:
 
     a_i = a_0 pitch / (pitch + e(x + p_i + lead) - e(x + p_i))
     X = X_n T_n (1 - a_c (1 - t_c,X)) ... (1 - a_k (1 - t_k,X)),   Y and Z alike
     L* = 116 f(Y / Y_n) - 16,  a* = 500 (f(X / X_n) - f(Y / Y_n)),  b* = 200 (f(Y / Y_n) - f(Z / Z_n))
     dE = sqrt((L* - L_0)^2 + (a* - a_0)^2 + (b* - b_0)^2)
 
-p_i is where the nozzles of ink i stand, t_i what a solid layer of it lets through of X, Y and Z, T_n what the paper
-gives back. f is the cube root, and a straight line below (6/29)^3.
+p_i is the position of the nozzles of ink i, t_i the transmission of X, Y and Z of its solid layer, T_n the reflectance
+of the paper. f is the cube root, and a straight line below (6/29)^3.
 
-Source: CIE 15 (1976), 8.2.1 for L*a*b* and dE; Demichel 1924 and Neugebauer 1937 for inks that overlap by chance, whose
-product this is for layers that do not scatter; thesis 11.2. Inks, places of nozzles and coverage are chosen.
+Source: CIE 15 (1976), 8.2.1 for L*a*b* and dE; Demichel 1924 and Neugebauer 1937 for inks with random overlap,
+a product for layers without scattering; thesis 11.2. Inks, places of nozzles and coverage are chosen.
 """
 
 from typing import NamedTuple

@@ -1,10 +1,10 @@
-"""The curve of a motor driver: current against voltage with the motor held fast, 0 to 3 V in steps of 0.1 V.
+"""Characteristic of a motor driver: current over voltage with the motor blocked, 0 to 3 V in steps of 0.1 V.
 
-    I = I_0                      V < V_k         some current whatever the voltage
+    I = I_0                      V < V_k         constant current
     I = I_0 + g (V - V_k)        V >= V_k        by least squares                                            (12.3)
 
-Every voltage is held for 7500 samples after a moment to settle, and the current is their mean. The shunt of 1 ohm is
-what the emulator calls `truth_current`; on a bench the same current is recorded in a column `current`.
+Every voltage is held for 7500 samples after the settling time; the current is the mean of the samples. The current of
+the 1 ohm shunt is the column `truth_current` of the emulator, and the column `current` on a bench.
 
 Source: thesis 12.2, figure 12.3. Erratum: the text gives 0.23 A at 3.0 V, its equation 0.262 A.
 """
@@ -20,36 +20,36 @@ from rtctl.identify.records import Record
 from rtctl.machines.profile import AMPLIFIER
 from rtctl.plants import ldu
 
-SAMPLES = 7500  # a voltage
-SETTLE = 0.1  # s, before they are taken
-HELD = 1e5  # N, what the brake of the experiment holds
-GAIN = 10.0  # V/m, of the law that turns the reference into volts: so small that a count of the encoder changes none
-BEND = 0.2  # of the slope: a point that lies on a line of less is on the flat part
+SAMPLES = 7500  # samples for each voltage
+SETTLE = 0.1  # s, settling time before the samples
+HELD = 1e5  # N, holding force of the brake
+GAIN = 10.0  # V/m of the law from reference to volts; a count of the encoder changes no output code
+BEND = 0.2  # share of the slope: points on a line of smaller slope belong to the flat part
 
 
 class Level(NamedTuple):
-    volts: float  # mean of what the board wrote, signed by its direction
+    volts: float  # V, mean output of the board, signed by direction
     ampere: float  # mean current
-    deviation: float  # A, of the samples
+    deviation: float  # A, standard deviation of the samples
     samples: int
 
 
 class DriverCurve(NamedTuple):
     levels: tuple[Level, ...]
-    I_0: float  # A, below the knee; 0 where there is no flat part
-    V_k: float  # V, knee; 0 where there is no flat part
+    I_0: float  # A, below the knee; 0 without flat part
+    V_k: float  # V, knee; 0 without flat part
     gain: float  # A/V, above the knee
-    gain_half: float  # 95 %
+    gain_half: float  # A/V, half width of the 95 % interval
     at_3: float  # A, at 3 V by the fit
     worst: float  # A, largest deviation from the fit
-    torque: float | None  # Nm, that I_0 makes of the motor
+    torque: float | None  # Nm, motor torque at I_0
 
 
 def driver_config(config: Any, highest: float = 3.0, step: float = 0.1) -> Any:
-    """The config that holds the carriage fast and writes 0 to `highest` V, by a law that is nothing but a gain.
+    """Config with blocked carriage that writes 0 to `highest` V through a proportional law.
 
-    The amplifier is written raw, without the inverse of its curve. Raises UserError where `highest` is above 3.0 V,
-    where it runs away.
+    The amplifier is written without inversion of its characteristic. Raises UserError for `highest` above 3.0 V, where
+    the amplifier runs away.
     """
     need(config.kind, config.name, AMPLIFIER)
     if not 0 < step <= highest <= 3.0 + 1e-9:
@@ -77,9 +77,9 @@ def driver_config(config: Any, highest: float = 3.0, step: float = 0.1) -> Any:
 
 
 def driver_curve(record: Record, least: int = SAMPLES) -> DriverCurve:
-    """The curve from every stretch of at least `least` samples at one voltage, both directions together.
+    """Driver characteristic from every interval of at least `least` samples at one voltage, both directions together.
 
-    Raises NoAnswer where the motor turns or there are fewer than 8 voltages, UserError where no current was recorded.
+    Raises NoAnswer where the motor turns or for fewer than 8 voltages, UserError where no current was recorded.
     """
     column = "current" if "current" in record.columns else "truth_current"
     if column not in record.columns:
@@ -107,14 +107,14 @@ def driver_curve(record: Record, least: int = SAMPLES) -> DriverCurve:
 
 
 def fit(levels: tuple[Level, ...], K_m: float | None = None) -> DriverCurve:
-    """(12.3) through the levels; sizes without sign. The knee is where the flat part and the line cross."""
+    """Fit of (12.3) to absolute levels. The knee is the intersection of the flat part and the line."""
     V = np.abs([level.volts for level in levels])
-    I = np.abs([level.ampere for level in levels])  # noqa: E741 - the field's name for a current
+    I = np.abs([level.ampere for level in levels])  # noqa: E741 - usual symbol of a current
     order = np.argsort(V, kind="stable")
     V, I = V[order], I[order]  # noqa: E741
     overall = np.polyfit(V[len(V) // 2 :], I[len(V) // 2 :], 1)[0]
     best: tuple[float, int] | None = None
-    for n in range(0, len(V) - 3):  # the first n points lie flat
+    for n in range(0, len(V) - 3):  # the first n points form the flat part
         if n == 1 or (n and abs(np.polyfit(V[:n], I[:n], 1)[0]) > BEND * abs(overall)):
             continue
         M = np.column_stack((np.ones(len(V) - n), V[n:]))

@@ -1,9 +1,9 @@
-"""What to play for a frequency response: constant speed to and fro, and an excitation within the machine's limits.
+"""Experiments for a frequency response: constant speed to and fro, and an excitation within the machine's limits.
 
-The reference goes half a leg back and then whole legs to and fro, so that the mean radii of the reels are those at the
-start and dry friction is seen in both directions but never turns within a leg. The excitation stays so small that
-speed keeps its sign and the drive its limits. One motor of the reel unit carries the whole command (`motor`): with the
-usual allocation the two pull by turns, which is not one response.
+The reference goes half a leg back and then whole legs to and fro. The mean reel radii are then those at the start. Dry
+friction acts in both directions but keeps its sign within a leg. The excitation is small enough that speed keeps its
+sign and the drive is not saturated. One motor of the reel unit takes the whole command (`motor`): with the usual
+allocation the motors alternate, which is not one response.
 
     ivu   5 V/rad and 0.5 Vs/rad, |L| = 1 at 0.9 Hz; chosen, five times the 1 V/rad and 0.1 Vs/rad of 8.1
     ldu   1e3 V/m and 0.1 s, 5 mm/s, 0.25 V rms                                                                   (12.3)
@@ -27,7 +27,7 @@ START = 0.2  # s at rest before the first leg
 
 
 class Experiment(NamedTuple):
-    """A config that plays it, and how long that takes from the first tick on."""
+    """Config of an experiment, and its duration in s from the first tick."""
 
     config: Any
     seconds: float
@@ -45,11 +45,11 @@ def multisine(
     period: float = PERIOD,
     keep_law: bool = False,
 ) -> list[Experiment]:
-    """One experiment a realisation, for `best_linear.identify`: `legs` at constant speed, each of `periods` periods
-    and one more for the transient.
+    """Multisine experiments for `best_linear.identify`, one for each realisation.
 
-    `rms` in V, `speed` in rad/s or m/s, `band` in Hz, `period` in s. `keep_law` leaves gains as they are.
-    Raises UserError where the size does not fit the machine's limits.
+    Each has `legs` at constant speed of `periods` periods and one more for the transient. `rms` in V, `speed` in rad/s
+    or m/s, `band` in Hz, `period` in s. `keep_law` keeps the gains. Raises UserError for amplitudes beyond the limits
+    of the machine.
     """
     usual = usual_of(config)
     low, high = band or usual.band
@@ -74,11 +74,11 @@ def noise(
     top: float | None = None,
     keep_law: bool = False,
 ) -> list[Experiment]:
-    """Band-limited noise for `sensitivity.identify`: `averages` windows of 4.096 s at half overlap, `windows` a leg.
+    """Experiments with band-limited noise for `sensitivity.identify`: `averages` windows of 4.096 s at half overlap.
 
-    One run where its noise lasts without repeating, else one a leg, each with noise of its own: a waveform has 65536
-    ticks, 131 s at 500 Hz and 6.6 s at 10 kHz. `rms` in V, `speed` in rad/s or m/s, `top` in Hz.
-    Raises UserError where the size does not fit the limits.
+    A leg holds `windows` windows. One run serves where its noise does not repeat; else each leg is a run with another
+    seed: a waveform has 65536 ticks, 131 s at 500 Hz and 6.6 s at 10 kHz. `rms` in V, `speed` in rad/s or m/s, `top`
+    in Hz. Raises UserError for amplitudes beyond the limits of the machine.
     """
     usual = usual_of(config)
     rate = config.loop.rate
@@ -94,7 +94,7 @@ def noise(
 
 
 def usual_of(config: Any) -> Usual:
-    """The usual excitation of a machine. Raises UserError where there is none."""
+    """Usual excitation of a kind of machine. Raises UserError for a kind without one."""
     response = profile_of(config.kind).response
     if response is None:
         known = [kind for kind, profile in PROFILES.items() if profile.response is not None]
@@ -126,7 +126,7 @@ def _prepared(config: Any, usual: Usual, motor: int, keep_law: bool) -> Any:
 
 
 def _to_and_fro(config: Any, legs: int, leg: float, speed: float) -> tuple[Any, float]:
-    """Half a leg back, then `legs` whole ones of `leg` s each, on ticks."""
+    """Config and duration in s of a reference: half a leg back, then `legs` legs of `leg` s each, on ticks."""
     dt = 1.0 / config.loop.rate
     leg = ceil(leg / dt) * dt
     length = speed * leg

@@ -1,4 +1,4 @@
-"""What the drives of a record push with: volts into the force on what moves.
+"""Force of the drives of a record, from their voltages.
 
 Source: thesis 7.2 for A/V of the IVU, (12.3) for the amplifier of the LDU, N K_m / R_c for its gear.
 """
@@ -12,16 +12,16 @@ from rtctl.plants import ivu, ldu
 
 
 def tape_force(record: Record) -> np.ndarray:
-    """What the motors of an IVU push with along the tape, N (n,), positive towards reel 1."""
+    """Force (n,) of the motors of an IVU along the tape in N, positive towards reel 1."""
     K = torque_per_volt(record)
     return K[0] * record["u1"] / record["R1"] - K[1] * record["u2"] / record["R2"]
 
 
 def friction_force(record: Record) -> np.ndarray:
-    """What holds a machine in steady motion, (n,): Nm of a motor if both of an IVU are alike, V at an LDU's board.
+    """Friction (n,) in steady motion: Nm of a motor of an IVU with equal motors, V at the board of an LDU.
 
-    Of an LDU it is the voltage that would give the current that flows: the measured amplifier gives as much at 0 V as
-    at 0.8 V, in the direction of its bit.
+    For an LDU it is the voltage above the knee with equal current: the measured amplifier gives the same current at 0 V
+    as at 0.8 V, in the direction of its bit.
     """
     if record.profile.has(REELS):
         return tape_force(record) / (1.0 / record["R1"] + 1.0 / record["R2"])
@@ -32,12 +32,12 @@ def friction_force(record: Record) -> np.ndarray:
 
 
 def written_force(record: Record) -> np.ndarray:
-    """The same, (n,), but with the voltage that the board writes as it is."""
+    """`friction_force` (n,) with the written voltage of the board, without the knee."""
     return friction_force(record) if record.profile.has(REELS) else record["u"]
 
 
 def newtons(record: Record, rows: slice) -> float:
-    """Mean of the same in N, along the tape or at the carriage."""
+    """Mean drive force in N over `rows`, along the tape or at the carriage."""
     force = tape_force(record) if record.profile.has(REELS) else carriage_force(record)
     return float(np.mean(force[rows]))
 
@@ -49,7 +49,7 @@ def torque_per_volt(record: Record) -> tuple[float, float]:
 
 
 def carriage_force(record: Record) -> np.ndarray:
-    """Force in N (n,) at the carriage of an LDU, through the curve that its config says of the amplifier (12.3)."""
+    """Force (n,) at the carriage of an LDU in N, by the amplifier characteristic of its config (12.3)."""
     p = ldu.parameters(record.config.plant)
     curve = ldu_amplifier.build(record.config.amplifier, 1.0)
     u = record["u"]

@@ -1,4 +1,4 @@
-"""A frequency response as it was measured: complex values with their standard deviation, and what they belong to."""
+"""Measured frequency response: complex values, standard deviations and conditions of the measurement."""
 
 from typing import Any, NamedTuple
 
@@ -9,11 +9,11 @@ from rtctl.identify.records import Record
 from rtctl.machines.profile import REELS
 from rtctl.machines.profiles import profile_of
 
-CIRCLE_95 = 1.7308  # radius in standard deviations of a complex number that holds 95 % of it: sqrt(-ln 0.05)
+CIRCLE_95 = 1.7308  # radius of the 95 % circle of a complex number in standard deviations: sqrt(-ln 0.05)
 
 
-CARRIED, MEDIAN = 0.5, 0.35  # relative deviation of a line, and of the middle one of it and its neighbours
-NEIGHBOURS = 5  # on either side
+CARRIED, MEDIAN = 0.5, 0.35  # greatest relative deviation of a line, and of the median over its neighbours
+NEIGHBOURS = 5  # neighbours on either side
 
 
 class Frf(NamedTuple):
@@ -23,36 +23,36 @@ class Frf(NamedTuple):
     H: np.ndarray  # (n,) complex, rad/V or m/V; per A where the drive is divided out
     sd: np.ndarray  # (n,) standard deviation of H, root of E|dH|^2
     kind: str  # ivu | ldu | axis
-    motor: int  # 1 or 2, which one pulls; 1 where there is one
-    R1: float  # m, mean radius of reel 1 while it was measured; nan where there is none
+    motor: int  # driving motor, 1 or 2; 1 for a machine with one motor
+    R1: float  # m, mean radius of reel 1 during the measurement; nan without reels
     R2: float
     dt: float  # s
-    inflation: float  # variance of a smooth function's fit over that of independent lines
+    inflation: float  # variance of the fit of a smooth function over its variance with independent lines
     per_ampere: bool  # whether the known drive is divided out
 
     @property
     def relative(self) -> np.ndarray:
-        """Standard deviation over |H|, (n,)."""
+        """Relative standard deviation (n,), sd / |H|."""
         return self.sd / np.abs(self.H)
 
     def band(self) -> tuple[np.ndarray, np.ndarray]:
-        """Magnitude that 95 % of the measurements lie between, (n,) each; 0 where nothing is known from below."""
+        """Lower and upper 95 % limits of the magnitude, (n,) each; lower limit 0 where the circle includes 0."""
         away = CIRCLE_95 * self.sd
         return np.maximum(np.abs(self.H) - away, 0.0), np.abs(self.H) + away
 
     def at(self, f: float) -> complex:
-        """H at `f` Hz, interpolated in H (j w)^2, which is level. Raises UserError outside of the lines."""
+        """H at `f` Hz, interpolated in H (j w)^2, which varies slowly. Raises UserError outside of the lines."""
         if not self.f[0] <= f <= self.f[-1]:
             raise UserError(f"{f:g} Hz lies outside of the response, {self.f[0]:.3g} to {self.f[-1]:.3g} Hz")
         level = self.H * self.f**2
         return complex(np.interp(f, self.f, level.real), np.interp(f, self.f, level.imag)) / f**2
 
     def select(self, keep: np.ndarray) -> "Frf":
-        """The lines where `keep` (n,) holds."""
+        """Response at the lines where `keep` (n,) is True."""
         return self._replace(f=self.f[keep], H=self.H[keep], sd=self.sd[keep])
 
     def without_drive(self, config: Any) -> "Frf":
-        """H per ampere: the drive of the config divided out (thesis 8.1). Raises UserError where it is already."""
+        """H per ampere: the drive of the config divided out (thesis 8.1). Raises UserError the second time."""
         if self.per_ampere:
             raise UserError("the drive is divided out already")
         D = drive(config, self.f)
@@ -60,9 +60,9 @@ class Frf(NamedTuple):
 
 
 def carried(relative: np.ndarray) -> np.ndarray:
-    """Lines (n,) that the data carry, from the relative deviations (n,): the line and most of its neighbours do.
+    """Mask (n,) of sufficiently accurate lines, from relative deviations (n,) of each line and its neighbours.
 
-    A line alone proves nothing: where there is but noise, one in fifty is twice its own deviation.
+    One line is no evidence: in pure noise, one line in fifty is twice its own deviation.
     """
     k = min(NEIGHBOURS, (len(relative) - 1) // 2)
     around = np.pad(np.asarray(relative, float), k, mode="reflect") if k else np.asarray(relative, float)
@@ -71,7 +71,7 @@ def carried(relative: np.ndarray) -> np.ndarray:
 
 
 def drive(config: Any, f: np.ndarray) -> np.ndarray:
-    """Response (n,) of the known drive in A/V at `f` (n,) Hz. Raises UserError where the machine has none."""
+    """Response (n,) of the known drive in A/V at `f` (n,) in Hz. Raises UserError where no drive is known."""
     response = profile_of(config.kind).response
     if response is None:
         raise UserError(f"{config.kind}: volts are force there, no drive is known to be divided out")
@@ -79,7 +79,7 @@ def drive(config: Any, f: np.ndarray) -> np.ndarray:
 
 
 def motor_of(record: Record) -> int:
-    """The motor that carries the command. Raises UserError where both do in turn, which is not one response."""
+    """Motor that takes the whole command. Raises UserError where both motors do: that is not one response."""
     if not record.profile.has(REELS):
         return 1
     kind = record.config.law.allocation.kind
@@ -95,7 +95,7 @@ def motor_of(record: Record) -> int:
 
 
 def radii(record: Record, rows: Any) -> tuple[float, float]:
-    """Mean radii in m of the rows, as the laws take them; nan where there are no reels."""
+    """Mean radii in m over the rows, as used by the laws; nan without reels."""
     if not record.profile.has(REELS):
         return float("nan"), float("nan")
     return float(record["R1"][rows].mean()), float(record["R2"][rows].mean())

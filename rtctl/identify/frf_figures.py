@@ -1,4 +1,4 @@
-"""Pictures of frequency responses: sensitivity with coherence, best linear approximation with its levels, model fit."""
+"""Figures of frequency responses: sensitivity with coherence, best linear approximation with levels, model fit."""
 
 from typing import Any
 
@@ -35,7 +35,7 @@ def sensitivity(result: Sensitivity, model: np.ndarray | None = None) -> Figure:
 
 
 def best_linear(result: BestLinear) -> Figure:
-    """Response with its noise and distortion levels, and its phase."""
+    """Figure of a response with its noise and distortion levels, and its phase."""
     figure, (above, turn) = _panels(2, "Best linear approximation", heights=(2.4, 1))
     above.semilogx(result.f, _db(result.G), ".", color=BLUE, markersize=4, label="response")
     for level, color, words in (
@@ -53,7 +53,7 @@ def best_linear(result: BestLinear) -> Figure:
 
 
 def model_fit(result: Fit) -> Figure:
-    """Figure 8.3: measured and fitted response, magnitude and phase, one colour a response."""
+    """Figure 8.3: measured and fitted response, magnitude and phase, one colour for each response."""
     figure, (above, turn, off) = _panels(3, "Model fit", heights=(2.2, 1.6, 1))
     for i, (frf, model) in enumerate(zip(result.frfs, result.models, strict=True)):
         color = (BLUE, ORANGE, GREEN, RED)[i % 4]
@@ -87,13 +87,13 @@ def _panels(count: int, title: str, heights: tuple[float, ...]) -> tuple[Figure,
 
 def _magnitude(axes: Axes, frf: Frf, label: str, color: str = BLUE) -> None:
     low, high = frf.band()
-    floor = np.maximum(low, 0.1 * np.abs(frf.H))  # a band that reaches 0 has no lower end in dB
+    floor = np.maximum(low, 0.1 * np.abs(frf.H))  # 0 has no value in dB
     axes.fill_between(frf.f, _db(floor), _db(high), color=color, alpha=0.25, linewidth=0)
     axes.semilogx(frf.f, _db(frf.H), ".", color=color, markersize=3, label=label)
 
 
 def _unwrapped(H: np.ndarray) -> np.ndarray:
-    """Phase in degrees without jumps, from between -360 and 0: a mass begins at -180."""
+    """Unwrapped phase in degrees; it begins between -360 and 0: a mass begins at -180."""
     phase = np.degrees(np.unwrap(np.angle(H)))
     return phase - 360.0 * np.ceil(phase[0] / 360.0)
 

@@ -1,18 +1,18 @@
-"""Friction from break-away and from constant velocities, both ways, and the Stribeck curve through both.
+"""Friction from break-away and from constant velocities in both directions, and its Stribeck curve.
 
     F(v) = F_C + (F_S - F_C) exp(-(v / v_s)^2) + F_v v                                                        (8.3)
 
-Break-away: a soft proportional law follows a slow ramp to and fro, so that the force on what sticks grows slowly. What
-it has reached at most by the time that the machine runs off is the break-away force. Constant velocity: the mean force
-over whole turns of the capstan, 12 as in the thesis, so that what comes once a turn averages out.
+Break-away: a soft proportional law follows a slow ramp to and fro, so the force on the sticking machine grows slowly.
+The break-away force is the largest force before the machine moves off. Constant velocity: the mean force over whole
+turns of the capstan, 12 as in the thesis, which averages out ripple of one turn.
 
-On the IVU both motors rub, and what their drives push with along the tape is
+On the IVU both motors have friction, and the drive force along the tape is
 
     K_m (A/V) (u1 / R1 - u2 / R2) = tau_1 / R1 + tau_2 / R2 + tau_c / R_c
 
-The friction of one record is that of a motor as if both were alike and the capstan had none; `split` tells the three
-apart with records at several pairs of reels. That of the LDU is the board's voltage, as in 12.6, and with the
-amplifier's curve (12.3) the force at the carriage.
+The friction of one record is that of a motor, with equal motors and no friction of the capstan. `split` estimates all
+three from records at several pairs of reels. The friction of the LDU is the board's voltage, as in 12.6, and with the
+amplifier's characteristic (12.3) the force at the carriage.
 
 Source: thesis 8.1, (8.3), (8.4), figure 8.4, 12.6; Armstrong-Helouvry 1994 for break-away by a ramp.
 """
@@ -34,12 +34,12 @@ from rtctl.machines.profiles import profile_of
 from rtctl.plants import ivu
 
 TURN = 2.0 * np.pi
-WINDOW = 0.2  # s, and counts of the encoder in it, beyond which a machine runs off; what only gives way is slower
+WINDOW = 0.2  # s, and encoder counts in this time above which a machine moves off; compliance is slower
 COUNTS = 3
-RISE = 1.0  # s, that the force takes at least from half of what breaks away to all of it
-ALIKE_SPEED = 0.02  # share by which speeds of both directions may differ and be one
-ALIKE = 60.0  # condition of the balance beyond which pairs of reels do not tell the motors apart
-UNEVEN = 0.2  # deviation of the speed, in shares of it, beyond which it was not constant
+RISE = 1.0  # s, least rise time from half of the break-away force to the break-away force
+ALIKE_SPEED = 0.02  # relative difference below which speeds of both directions count as equal
+ALIKE = 60.0  # condition number of the balance above which the pairs of reels cannot separate the motors
+UNEVEN = 0.2  # relative deviation of the speed above which it was not constant
 
 
 class Point(NamedTuple):
@@ -47,17 +47,17 @@ class Point(NamedTuple):
 
     v: float  # rad/s of the capstan, with its sign; 0 for break-away
     force: float  # Nm of a motor (IVU) or V at the board (LDU), with its sign
-    error: float  # standard error of it
-    newtons: float  # along the tape (IVU) or at the carriage (LDU)
+    error: float  # standard error of the force
+    newtons: float  # N along the tape (IVU) or at the carriage (LDU)
 
 
 class Friction(NamedTuple):
     points: tuple[Point, ...]
-    both: Stribeck | None  # of the mean of both directions: a spring or a slope, which pushes one way, falls out
+    both: Stribeck | None  # of the mean of both directions, which cancels a spring or a slope
     forward: Stribeck | None
-    backward: Stribeck | None  # sizes are positive as well
+    backward: Stribeck | None  # with positive values
     unit: str
-    refused: tuple[str, ...]  # velocities that gave no answer, and why
+    refused: tuple[str, ...]  # velocities without a result, and the reason
 
 
 def _usual(machine: str) -> Usual:
@@ -67,9 +67,9 @@ def _usual(machine: str) -> Usual:
 
 
 def velocity_config(config: Any, speeds: Sequence[float] | None = None, turns: float = 12.0) -> Any:
-    """The config that runs at every speed (rad/s of the capstan) for `turns` turns, out and home again.
+    """Config that runs at every speed (rad/s of the capstan) for `turns` turns, forward and back.
 
-    A reel unit first winds to the smaller reel, so that it does not run empty. One turn more is for settling.
+    A reel unit first winds to the smaller reel, to keep it from running empty. One extra turn is for settling.
     """
     need(config.kind, config.name, REELS, SCALE)
     way = (turns + 1.0) * TURN
@@ -86,10 +86,10 @@ def velocity_config(config: Any, speeds: Sequence[float] | None = None, turns: f
 
 
 def break_away_config(config: Any, times: int = 2, most: float | None = None, rate: float | None = None) -> Any:
-    """The config that ramps the force up and down `times` times, up to `most` V at `rate` V/s.
+    """Config that ramps the force up and down `times` times, up to `most` V at `rate` V/s.
 
-    The law is proportional and so soft that the machine, once it moves, unloads it. No feedforward helps. While it gets
-    under way the force still grows: by 4 mV on an LDU (one code of its board), and 1 % on an IVU.
+    The law is proportional and so soft that the moving machine unloads it. Feedforward is off. During the start of the
+    motion the force still grows: by 4 mV on an LDU (one code of its board), and 1 % on an IVU.
     """
     need(config.kind, config.name, REELS, SCALE)
     usual = _usual(config.kind)
@@ -104,10 +104,10 @@ def break_away_config(config: Any, times: int = 2, most: float | None = None, ra
 
 
 def constant_velocity(record: Record, turns: float = 12.0) -> tuple[list[Point], list[str]]:
-    """Points from every stretch at constant reference speed that holds `turns` turns of the capstan; and refusals.
+    """Points from every leg at constant reference speed with `turns` turns of the capstan, and refusals.
 
-    The last whole turns of a stretch count, so that the start has died away. The standard error is that of the means
-    of single turns. Raises NoAnswer where there is no such stretch.
+    The last whole turns of a leg count, after the transient. The standard error comes from the means of single turns.
+    Raises NoAnswer where no leg is long enough.
     """
     t, (_, angle) = record["t"], _angles(record)
     force = friction_force(record)
@@ -126,7 +126,7 @@ def constant_velocity(record: Record, turns: float = 12.0) -> tuple[list[Point],
 
 
 def _turns(record: Record, turns: float, refused: list[str]) -> list[tuple[np.ndarray, float]]:
-    """Rows at which the last `turns` turns of every stretch at constant speed begin and end, and their direction."""
+    """First and last rows of the last `turns` turns of every leg at constant speed, and their direction."""
     t, (ref, angle) = record["t"], _angles(record)
     found = []
     for begin, end in ramps(t, ref, least=0.5):
@@ -138,21 +138,21 @@ def _turns(record: Record, turns: float, refused: list[str]) -> list[tuple[np.nd
             continue
         falls = np.minimum.accumulate(to_go)
         edges = np.unique(np.searchsorted(-falls, -TURN * np.arange(int(turns), -1, -1.0)) + begin)
-        most = min(counts_per_turn(record) * turns / 20, (edges[-1] - edges[0]) / 10)  # counts and ticks in a piece
+        most = min(counts_per_turn(record) * turns / 20, (edges[-1] - edges[0]) / 10)  # counts and ticks in a section
         pieces = np.linspace(edges[0], edges[-1] - 1, max(int(most), 3)).astype(int)
         moved = direction * np.diff(angle[pieces])
         if moved.std() > UNEVEN * moved.mean():
             v = direction * to_go[edges[0] - begin] / (t[edges[-1] - 1] - t[edges[0]])
-            refused.append(f"{v:+.3g} rad/s at {t[edges[0]]:.2f} s: it sticks and slips, which is no constant velocity")
+            refused.append(f"{v:+.3g} rad/s at {t[edges[0]]:.2f} s: stick-slip instead of constant velocity")
             continue
         found.append((edges, direction))
     return found
 
 
 def break_away(record: Record) -> list[Point]:
-    """Mean break-away force of each direction, from every ramp on which the machine runs off.
+    """Mean break-away force of each direction, from every ramp on which the machine moves off.
 
-    Raises NoAnswer where it never breaks away, or where the drive was at its limit.
+    Raises NoAnswer where the machine never breaks away, or where the drive was at its limit.
     """
     t, ref, angle = record["t"], *_angles(record)
     force = written_force(record)
@@ -164,9 +164,9 @@ def break_away(record: Record) -> list[Point]:
     for begin, end in ramps(t, ref, least=0.05):
         direction = np.sign(ref[end - 1] - ref[begin])
         runs = direction * ran[begin:end] >= (COUNTS - 0.5) * TURN / counts_per_turn(record)
-        # an amplifier that never gives less than some current kicks where its direction turns: there is no force yet
+        # an amplifier with a least current kicks at a reversal of its direction, before there is a ramp force
         gone = np.flatnonzero(runs & (direction * force[begin:end] > 0.0))
-        if not len(gone) or gone[0] == 0:  # it did not run off, or was running already
+        if not len(gone) or gone[0] == 0:  # it did not move off, or was moving before
             continue
         until = begin + int(gone[0]) + 1
         if any(np.abs(record[name][begin:until]).max() > 0.98 * limit for name in drives):
@@ -204,10 +204,9 @@ def points_of(records: Sequence[Record], turns: float = 12.0) -> tuple[list[Poin
 
 
 def friction(points: Sequence[Point], refused: Sequence[str], machine: str) -> Friction:
-    """Points of both kinds with the curve (8.3) through the mean of both directions and through either, None with
-    under 3 speeds.
+    """Friction points with fits of (8.3) to the mean of both directions and to each; None with under 3 speeds.
 
-    A direction shows a fall from standstill only where the mean does: at another place a spring alone makes one.
+    A direction has a Stribeck fall only where the mean has: at another position a spring alone resembles a fall.
     """
     ahead, behind = ([(abs(p.v), abs(p.force)) for p in points if np.sign(p.force) == sign] for sign in (1.0, -1.0))
     mean = []
@@ -232,13 +231,13 @@ class Split(NamedTuple):
     tau_1: float  # Nm
     tau_2: float
     tau_c: float
-    half: tuple[float, float, float]  # 95 % intervals
+    half: tuple[float, float, float]  # Nm, half widths of the 95 % intervals
 
 
 def split(records: Sequence[Record], turns: float = 12.0) -> Split:
-    """Dry friction of both motors and of the capstan of an IVU from constant velocities at several pairs of reels.
+    """Dry friction of both motors and of the capstan of an IVU, from constant velocities at several pairs of reels.
 
-    Least squares of the balance along the tape over all turns. Raises NoAnswer where the pairs are too alike.
+    Least squares of the force balance along the tape over all turns. Raises NoAnswer where the pairs are too alike.
     """
     rows, forces = [], []
     for record in records:
@@ -250,7 +249,7 @@ def split(records: Sequence[Record], turns: float = 12.0) -> Split:
     M: np.ndarray = np.array(rows).reshape(-1, 3)
     F = np.array(forces)
     if len(M) < 4 or np.linalg.cond(M / np.abs(M).max(axis=0)) > ALIKE:
-        raise NoAnswer(f"{len(records)} records have reels too alike to tell the friction of the two motors apart")
+        raise NoAnswer(f"{len(records)} records have reels too alike to separate the friction of the two motors")
     tau = np.linalg.lstsq(M, F, rcond=None)[0]
     variance = float(np.sum((F - M @ tau) ** 2)) / (len(F) - 3)
     half = 2.0 * np.sqrt(np.diag(np.linalg.inv(M.T @ M)) * variance)

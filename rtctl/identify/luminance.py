@@ -1,18 +1,18 @@
-"""Banding of a printed grey image: its luminance over the position, as a scanner sees it, and the position error.
+"""Banding of a printed grey image: scanned luminance over position, and its relation to the position error.
 
-Emulated: lines are meant to lie `pitch` apart and lie at x_n + e(x_n). Where they lie closer they cover
-more of the paper
+Emulation: lines have the nominal distance `pitch` and lie at x_n + e(x_n). Where lines lie closer, they cover more of
+the paper:
 
     a = a_0 pitch / (pitch + e(x_n + lead) - e(x_n)),   Y = Y_paper (1 - a) + Y_ink a,   L* = 116 Y^(1/3) - 16
 
 with `lead` the distance between the nozzles that print neighbouring lines. Ink and paper drift slowly (1/f), and the
 scanner averages over its aperture, adds noise and samples.
 
-Analysed: Fourier transform over the position (11.10) of luminance and error, cross spectrum E Gamma as printed, with
-the conjugate for its phase; the luminance through a band-pass around one wavelength, forwards and backwards.
+Analysis: Fourier transforms over position (11.10) of luminance and error; cross spectrum E Gamma as printed, with the
+conjugate for its phase; luminance through a band-pass around one wavelength, forwards and backwards.
 
 Source: thesis 11.2, 11.3, figures 11.8 to 11.10; CIE 15 (1976) for L*; Murray & Davies 1936 for the coverage. The
-thesis gives neither sizes nor the way from error to luminance; these are chosen.
+thesis gives neither sizes nor the model from error to luminance; both are chosen.
 """
 
 from typing import NamedTuple
@@ -51,23 +51,23 @@ class Cross(NamedTuple):
     wavelength: np.ndarray  # m, (k,)
     E: np.ndarray  # m, complex (k,)
     Gamma: np.ndarray  # L*, complex (k,)
-    S: np.ndarray  # m L*, complex (k,): E Gamma as the text has it
-    phase: np.ndarray  # rad, (k,), by which the luminance leads the error: of Gamma conj(E)
-    amplitude: np.ndarray  # L*, (k,), of a sine of the luminance
-    confidence: np.ndarray  # (k,) that both stand above the noise around
+    S: np.ndarray  # m L*, complex (k,): E Gamma as in the thesis
+    phase: np.ndarray  # rad, (k,), lead of the luminance before the error: phase of Gamma conj(E)
+    amplitude: np.ndarray  # L*, (k,), amplitude of a sine of the luminance
+    confidence: np.ndarray  # (k,) confidence that both exceed the surrounding noise
 
 
 class Band(NamedTuple):
     x: np.ndarray  # m, (n,)
     L: np.ndarray  # L*, (n,), band-passed
     wavelength: float  # m, mean
-    half: float  # m, 95 % of the mean
+    half: float  # m, half width of the 95 % interval of the mean
     amplitude: float  # L*, mean of the envelope
-    ripple: float  # deviation of the envelope, share of its mean
+    ripple: float  # relative standard deviation of the envelope
 
 
 def printed(x: np.ndarray, e: np.ndarray, settings: PrintSettings | None = None) -> Image:
-    """Luminance of a grey image that was printed with the error `e` (m, (n,)) at rising positions `x` (m, (n,)).
+    """Luminance of a grey image printed with the error `e` (m, (n,)) at rising positions `x` (m, (n,)).
 
     Raises NoAnswer where the record is shorter than a hundred lines, or lines overtake one another.
     """
@@ -89,7 +89,7 @@ def printed(x: np.ndarray, e: np.ndarray, settings: PrintSettings | None = None)
 
 
 def cross_spectrum(x: np.ndarray, e: np.ndarray, image: Image, N: int = 1000, x_e: float | None = None) -> Cross:
-    """Cross spectrum of the error `e` (m) over `x` (m) and the image, over what both cover.
+    """Cross spectrum of the error `e` (m) over `x` (m) and the image, over their common range.
 
     Raises NoAnswer as `spectrum` where the record is too short for `x_e` or `N`.
     """
@@ -107,11 +107,11 @@ def cross_spectrum(x: np.ndarray, e: np.ndarray, image: Image, N: int = 1000, x_
 
 
 def shared(cross: Cross) -> list[tuple[float, float, float]]:
-    """Wavelength (m), |S| (m L*) and confidence of the lines that error and luminance share, strongest first.
+    """Wavelength (m), |S| (m L*) and confidence of the common lines of error and luminance, strongest first.
 
-    Lines that are nearer than two bins run into one, as 150 and 300 mm do over 600 mm.
+    Lines nearer than two bins are not resolved, such as 150 and 300 mm over 600 mm.
 
-    Raises NoAnswer where there are none.
+    Raises NoAnswer without a common line.
     """
     size = np.abs(cross.S)
     tops = [k for k in range(len(size)) if cross.confidence[k] > SURE and size[k] == size[max(k - 2, 0) : k + 3].max()]
@@ -122,10 +122,10 @@ def shared(cross: Cross) -> list[tuple[float, float, float]]:
 
 
 def band_pass(image: Image, longest: float = 20e-3, shortest: float = 17e-3) -> Band:
-    """The luminance between two wavelengths (m), second-order Butterworth, forwards and backwards (figure 11.10).
+    """Luminance between two wavelengths (m), second-order Butterworth, forwards and backwards (figure 11.10).
 
     Wavelength and envelope are those of the analytic signal, without two wavelengths at either end. Raises NoAnswer
-    where the image is shorter than eight wavelengths, or the envelope falls below a fifth: there is no such wave then.
+    where the image is shorter than eight wavelengths, or where the envelope falls below a fifth: no steady wave then.
     """
     from scipy.signal import butter, hilbert, sosfiltfilt
 
@@ -135,7 +135,7 @@ def band_pass(image: Image, longest: float = 20e-3, shortest: float = 17e-3) -> 
             f"an image of {1e3 * np.ptp(image.x):.0f} mm is too short for waves of {1e3 * longest:.0f} mm; take 8"
         )
     sos = butter(2, [1.0 / longest, 1.0 / shortest], "bandpass", fs=1.0 / dx, output="sos")
-    # the filter rings for some six wavelengths: extended by that, the ends keep their size
+    # padding by six wavelengths, the ringing of the filter, keeps the amplitude at the ends
     L = sosfiltfilt(sos, image.L - image.L.mean(), padlen=min(len(image.L) - 1, round(6.0 * longest / dx)))
     edge = round(2.0 * longest / dx)
     analytic = hilbert(L)[edge:-edge]

@@ -1,9 +1,9 @@
-"""A machine's own model as a function of named parameters, at the reel radii and with the motor of a response.
+"""Plant model of a machine as a function of named parameters, at the reel radii and motor of a response.
 
     H = P(j w) sinc(f T) e^(-j w tau)         hold T = 1/rate, delay tau = T_s/2 + T_c  (8.2)
 
-P is `state_space` of the plant with the parameters at hand. On the reel unit one name stands for both sides where they
-are alike: J_m for J_m1 and J_m2, and so for c_m, k_m, c, k and K_m.
+P is `state_space` of the plant with the given parameters. On a reel unit with equal sides one name stands for both
+sides: J_m for J_m1 and J_m2, likewise c_m, k_m, c, k and K_m.
 
 Source: thesis 4.9-4.17, 8.2 and appendix F, through rtctl.plants.
 """
@@ -17,16 +17,16 @@ from rtctl.design import response
 from rtctl.identify.frf import Frf, drive
 from rtctl.machines.profiles import profile_of
 
-F_GAIN = 1.0  # Hz, of the process gain (8.2)
+F_GAIN = 1.0  # Hz, frequency of the process gain (8.2)
 
 
 def keys(kind: str, name: str) -> tuple[str, ...]:
-    """Keys of the plant's parameters for which a name stands."""
+    """Keys of the plant's parameters for a name."""
     return profile_of(kind).pairs.get(name, (name,))
 
 
 class Model:
-    """A machine's plant as a function of named parameters."""
+    """Plant of a machine as a function of named parameters."""
 
     def __init__(self, config: Any, names: Sequence[str]):
         self.config, self.kind = config, config.kind
@@ -35,7 +35,7 @@ class Model:
         self.start = {name: float(getattr(self.base, keys(self.kind, name)[0])) for name in names}
 
     def settings(self, values: Mapping[str, float]) -> Any:
-        """Settings of the plant with these values in its parameters."""
+        """Settings of the plant with these parameter values."""
         given = self.config.plant.parameters.model_dump(exclude_unset=True)
         for name, value in values.items():
             given.update(dict.fromkeys(keys(self.kind, name), value))
@@ -43,16 +43,16 @@ class Model:
         return plant.model_copy(update={"parameters": type(plant.parameters)(**given)})
 
     def linear(self, values: Mapping[str, float], frf: Frf) -> response.Model:
-        """The plant linearised at the radii of a response, the motor of that response pulling."""
+        """Plant linearised at the radii of a response and driven by its motor."""
         profile, blocks = profile_of(self.kind), self.parts.blocks
         assert profile.response is not None and profile.model is not None
         p = profile.response.params(self.settings(values), frf.R1, frf.R2)
-        if "allocation" in blocks:  # the motor of the response alone
+        if "allocation" in blocks:  # only the motor of the response
             blocks = {**blocks, "allocation": blocks["allocation"]._replace(kind=1 + frf.motor)}
         return profile.model(self.config, p, blocks, frf.motor)
 
     def response(self, values: Mapping[str, float], frf: Frf, tau: float) -> np.ndarray:
-        """H at the lines of a response, hold and the delay `tau` s included, per ampere where the response is."""
+        """Model response (n,) at the lines of `frf`, with hold and delay `tau` in s; per ampere where `frf` is."""
         P = response.plant_response(self.linear(values, frf), frf.f)
         if frf.per_ampere:
             P = P / drive(self.config, frf.f)

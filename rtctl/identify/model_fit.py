@@ -1,27 +1,27 @@
-"""Fit of a machine's own model to its measured response, magnitude and phase weighted by how well they are known.
+"""Fit of the plant model to a measured response, weighted by the accuracy of magnitude and phase.
 
     minimise sum over lines of |ln(H / H_model)|^2 / (sd / |H|)^2          real part magnitude, imaginary part phase
     H_model = P(j w; parameters) (1 - e^(-j w T)) / (j w T) e^(-j w (tau - T/2))          tau = T_s/2 + T_c    (8.2)
 
-P is `state_space` of the plant, evaluated with the parameters at hand; nothing is written twice. The logarithm makes
-an error of magnitude and of phase worth the same and has no bias for a circular error. Parameters are fitted by their
-logarithm, so they stay positive and their intervals are factors. The covariance is (J^T J)^-1, made larger by the
-chi-square a line where the misfit is more than the noise, and by an error of 0.1 % that all lines share (rounding of
-the encoder is no noise), times Student's t: the interval covers 95 %.
+P is `state_space` of the plant with the given parameters. The logarithm weights errors of magnitude and of phase
+equally and has no bias for a circular error. Parameters are fitted by their logarithm: they stay positive and their
+intervals are factors. The covariance is (J^T J)^-1. It grows by the chi-square per line where the misfit exceeds the
+noise, and by an error of 0.1 % common to all lines (rounding of the encoder is no noise). The interval is the deviation
+times Student's t and covers 95 %.
 
-What the capstan's angle alone carries, one motor pulling (reel unit): J_m from the level, since K_m and the radii are
-known; c and k of the tape from the decoupling of the far reel at 1.9 Hz; c_m and k_m from the mode at 41 Hz, where reel
-1 (its inertia from its radius, 4.1) swings between its shaft and the tape. The reel sensors are not needed. It takes
-both sides as equal, as the thesis does (c_1 = c_2 and so on). What it hardly carries is K_m beside J_m: their ratio is
-the level, and only the known inertia of the reel tells them apart, to some 5 %.
+Parameters of the reel unit from the capstan angle, with one driving motor: J_m from the level, with known K_m and
+radii; c and k of the tape from the decoupling of the far reel at 1.9 Hz; c_m and k_m from the mode at 41 Hz, where reel
+1 (its inertia from its radius, 4.1) swings between its shaft and the tape. The reel sensors are not needed. Both sides
+are assumed equal, as in the thesis (c_1 = c_2 and so on). K_m and J_m together are ill-conditioned: the level gives
+their ratio, and only the known inertia of the reel separates them, to some 5 %.
 
-Where the sides are not equal that model does not explain the response, and the fit refuses (`MISFIT`). All ten
-parameters of the two sides (`EACH`) take responses of both motors at two pairs of radii, say 38/22 and 30/30 mm: by
-each motor its own reel is the near one, and an empty reel (8e-6 kg m^2) has its shaft mode at 190 Hz, out of the band.
+Where the sides are not equal, this model does not explain the response, and the fit refuses (`MISFIT`). All ten
+parameters of the two sides (`EACH`) need responses of both motors at two pairs of radii, say 38/22 and 30/30 mm. For
+each motor its own reel is the near one. An empty reel (8e-6 kg m^2) has its shaft mode at 190 Hz, out of the band.
 
-The linear drive is a mass-damper up to 50 Hz, whose level is the motor behind its transmission: J_m N^2 / R_c^2 = 44 kg
-beside a carriage of 1.25 kg. M, k_c and b_c come from the mode at 119 Hz. k_s and b_s have theirs at 2.1 kHz, and the
-fit refuses them.
+The linear drive is a mass-damper up to 50 Hz. Its level is mostly the motor behind its transmission: J_m N^2 / R_c^2 =
+44 kg beside a carriage of 1.25 kg. M, k_c and b_c come from the mode at 119 Hz. The mode of k_s and b_s is at 2.1 kHz,
+and the fit refuses them.
 
 Source: thesis 8.1, 8.2, 12.3; Pintelon & Schoukens, System Identification (2012), chapter 9.
 """
@@ -42,32 +42,32 @@ from rtctl.machines.profiles import PROFILES, profile_of
 __all__ = ["EACH", "FREE", "Estimate", "Fit", "fit", "process_gain"]
 
 FREE = {kind: profile.response.free for kind, profile in PROFILES.items() if profile.response is not None}
-SPAN = 8.0  # factor by which a parameter may leave its start
-VAGUE = 1.0  # logarithm: an interval wider than a factor of e each way is no answer
-MISFIT = 2.0  # chi-square a degree of freedom above which the model is not that of the machine
-COMMON = 1e-3  # relative deviation that all lines share: rounding of the encoder turns H of the ldu by 1 to 3 mrad
-STEP = 1e-4  # logarithm, of a difference
-STARTS, AROUND = 8, 0.35  # further starts of the fit, logarithms away from the model
+SPAN = 8.0  # limit of a parameter as a factor of its start value
+VAGUE = 1.0  # logarithm: an interval wider than a factor of e each way is refused
+MISFIT = 2.0  # chi-square per degree of freedom above which the model is rejected
+COMMON = 1e-3  # relative deviation common to all lines: encoder rounding turns H of the ldu by 1 to 3 mrad
+STEP = 1e-4  # logarithm, step of a finite difference
+STARTS, AROUND = 8, 0.35  # further starts of the fit, and their distance from the model in logarithms
 
 
 class Estimate(NamedTuple):
     value: float
-    low: float  # 95 % interval
+    low: float  # lower limit of the 95 % interval
     high: float
     unit: str
 
 
 class Fit(NamedTuple):
     parameters: dict[str, Estimate]
-    tau: Estimate  # s, delay with that of the hold (8.2)
+    tau: Estimate  # s, delay including the hold (8.2)
     K_p: Estimate  # |H| (2 pi f)^2 at 1 Hz, rad/s^2 per A or m/s^2 per A, of the first response
-    chi2: float  # misfit a degree of freedom; 1 where the model explains all but the noise
+    chi2: float  # chi-square per degree of freedom; 1 where the residual is noise
     lines: int
     band: tuple[float, float]  # Hz
     correlation: np.ndarray  # (m, m) of the logarithms, tau last
-    settings: Any  # the plant's settings with the parameters in them
+    settings: Any  # settings of the plant with the fitted parameters
     frfs: tuple[Frf, ...]
-    models: tuple[np.ndarray, ...]  # response of the model at the lines of each
+    models: tuple[np.ndarray, ...]  # response of the model at the lines of each measured response
 
 
 def fit(
@@ -77,11 +77,11 @@ def fit(
     band: tuple[float, float] | None = None,
     tau: float | None = None,
 ) -> Fit:
-    """Fit the model of `config.plant`, from which it starts, to one or more responses at their own reel radii.
+    """Fit the model of `config.plant`, the start of the search, to one or more responses at their reel radii.
 
-    `free` names parameters (one name for both sides of the reel unit: J_m, c, k, c_m, k_m), `band` is in Hz, `tau` in
-    s is fitted as well where it is None. Raises UserError for a name that the plant does not have, NoAnswer where the
-    lines do not carry the parameters (too few, or an interval wider than a factor of 2.7 each way, named).
+    `free` names parameters (one name for both sides of the reel unit: J_m, c, k, c_m, k_m). `band` is in Hz. `tau` in s
+    is also fitted where it is None. Raises UserError for an unknown parameter. Raises NoAnswer where the lines do not
+    determine the parameters: too few lines, or an interval wider than a factor of 2.7 each way.
     """
     from scipy.stats import t as student
 
@@ -93,8 +93,8 @@ def fit(
     lines = sum(len(frf.f) for frf in kept)
     if 2 * lines < 3 * (len(names) + 1):
         raise NoAnswer(
-            f"{lines} lines of the response are carried from {bottom:g} to {top:g} Hz; {len(names) + 1} parameters "
-            f"need {int(np.ceil(1.5 * (len(names) + 1)))} at least"
+            f"{lines} lines of the response are accurate enough from {bottom:g} to {top:g} Hz; {len(names) + 1} "
+            f"parameters need {int(np.ceil(1.5 * (len(names) + 1)))} at least"
         )
     model = Model(config, names)
     dt = kept[0].dt
@@ -165,13 +165,13 @@ def _response(config: Any) -> Response:
 
 
 def _best(misfit: Callable[[np.ndarray], np.ndarray], start: np.ndarray, span: float) -> Any:
-    """Least squares from the model and from STARTS points around it: a resonance has more than one valley."""
+    """Least squares from the model and from STARTS points around it: a resonance gives several local minima."""
     from scipy.optimize import least_squares
 
     around = np.random.default_rng(0).uniform(-AROUND, AROUND, (STARTS, len(start)))
 
     def jacobian(x: np.ndarray) -> np.ndarray:
-        """Central differences, wide enough that rounding in a stiff plant does not pass for sensitivity."""
+        """Jacobian by central differences, with a step above the rounding errors of a stiff plant."""
         steps = STEP * np.eye(len(x))
         return np.stack([(misfit(x + h) - misfit(x - h)) / (2 * STEP) for h in steps], axis=1)
 
@@ -196,17 +196,17 @@ def _misfit(frfs: tuple[Frf, ...], models: list[np.ndarray], chi2: float, config
 
 
 def _covariance(J: np.ndarray, names: Sequence[str], late: bool) -> np.ndarray:
-    """(J^T J)^-1. Raises NoAnswer that names the parameters where the lines say nothing of a combination of them."""
+    """Covariance (J^T J)^-1. Raises NoAnswer with the parameters of an undetermined combination."""
     _, s, V = np.linalg.svd(J, full_matrices=False)
     if s[-1] < 1e-9 * s[0]:
         every = (*names, "tau") if late else tuple(names)
         mixed = [name for name, part in zip(every, V[-1], strict=True) if abs(part) > 0.3]
-        raise NoAnswer(f"the response does not carry {' and '.join(mixed)} apart; fix one of them")
+        raise NoAnswer(f"the response does not separate {' and '.join(mixed)}; fix one of them")
     return (V.T / s**2) @ V
 
 
 def _common(J: np.ndarray, alone: np.ndarray, counts: list[int], weights: np.ndarray) -> np.ndarray:
-    """Covariance by an error of COMMON in the magnitude of all lines, and another in their phase."""
+    """Covariance by a common error of COMMON in the magnitude of all lines, and one in their phase."""
     ends = np.cumsum([0, *counts])
     total = np.zeros_like(alone)
     for part in (0, 1):
@@ -224,13 +224,13 @@ def _check_known(
     for i, name in enumerate((*names, "tau")[: len(x)]):
         if abs(x[i] - start[i]) > 0.99 * span:
             raise NoAnswer(
-                f"{name} runs to {np.exp(x[i]):.3g}, {SPAN:g} times from where the model has it; the response from "
-                f"{band[0]:g} to {band[1]:g} Hz does not carry it, or is not that of this model"
+                f"{name} runs to {np.exp(x[i]):.3g}, a factor of {SPAN:g} off the model; the response from "
+                f"{band[0]:g} to {band[1]:g} Hz does not determine it, or the model is wrong"
             )
         if wide[i] > VAGUE:
             raise NoAnswer(
-                f"the response from {band[0]:g} to {band[1]:g} Hz does not carry {name}: {np.exp(x[i]):.3g} within a "
-                f"factor of {np.exp(wide[i]):.2g}; widen the band, measure longer, or leave it out"
+                f"the response from {band[0]:g} to {band[1]:g} Hz does not determine {name}: {np.exp(x[i]):.3g} within "
+                f"a factor of {np.exp(wide[i]):.2g}; widen the band, measure longer, or leave it out"
             )
 
 
@@ -242,7 +242,7 @@ def _units(config: Any, names: Sequence[str]) -> dict[str, str]:
 def _process_gain(
     model: Model, frf: Frf, values: dict[str, float], x: np.ndarray, covariance: np.ndarray, wide: Any, deviation: Any
 ) -> Estimate:
-    """At 1 Hz, with the interval that the covariance of the parameters gives it."""
+    """Process gain at 1 Hz, with the interval by the covariance of the parameters."""
     K = model.process_gain(values, frf)
     slope = np.zeros(len(x))
     for i, name in enumerate(values):

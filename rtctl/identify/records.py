@@ -1,10 +1,10 @@
-"""A record: the rows of a run while it ran, whether it comes from a bundle or from a fused run.
+"""Record: rows of a run while the machine ran, from a bundle or from a fused run.
 
-    record = take(load_bundle("runs/ivu-1"))       a recording of our own daemon
+    record = take(load_bundle("runs/ivu-1"))       a recording of the daemon
     record = take(fused.run(config, 30.0))         a run on virtual time
-    record["capstan"], record.dt, record.config    the same in both cases
+    record["capstan"], record.dt, record.config    in both cases
 
-Experiments read records and nothing else, so they do not know where the data come from.
+Experiments read only records and do not depend on the source of the data.
 """
 
 from collections.abc import Mapping
@@ -20,20 +20,20 @@ from rtctl.machines.profiles import profile_of
 from rtctl.tick import safety
 from rtctl.trace.bundle import Bundle
 
-SWINGING = 0.02  # share of saturated samples above which the excitation alone is not to blame
-TURNING = 1e-3  # share of samples that may run against the reference
-STEADY = 0.02  # share of the top speed by which the reference may change its speed in a second
+SWINGING = 0.02  # share of saturated samples above which the excitation is not the only cause
+TURNING = 1e-3  # largest share of samples that move against the reference
+STEADY = 0.02  # largest change of the reference speed in a second, as a share of the top speed
 
 
 @dataclass(frozen=True)
 class Record:
-    """Rows of a run while it ran, and what they were recorded with."""
+    """Rows of a run while the machine ran, with the settings of the recording."""
 
     kind: str  # ivu | ldu | axis
-    config: Any  # settings that it was recorded with
+    config: Any  # settings of the recording
     dt: float  # s
     columns: Mapping[str, np.ndarray]  # (n,) each, rows while the machine ran
-    trip: str  # name of the trip that ended it, "" for none
+    trip: str  # name of the trip that ended the run, "" for none
     trip_time: float  # s of the controller clock
     source: str  # folder, or the name of the machine
 
@@ -45,12 +45,12 @@ class Record:
 
     @property
     def profile(self) -> Profile:
-        """What the machine is."""
+        """Profile of the kind of machine."""
         return profile_of(self.kind)
 
     @property
     def signals(self) -> Columns:
-        """Names of the position, the command and what was written."""
+        """Column names of position, command and output."""
         return self.profile.columns
 
     @property
@@ -70,9 +70,9 @@ class Record:
 
 
 def take(source: Run | Bundle | Record) -> Record:
-    """The record of a run or a bundle.
+    """Record of a run or a bundle.
 
-    Raises UserError where a bundle holds no config of ours, NoAnswer where the machine never ran.
+    Raises UserError where a bundle holds no rtctl config, NoAnswer where the machine never ran.
     """
     if isinstance(source, Record):
         return source
@@ -96,15 +96,15 @@ def take(source: Run | Bundle | Record) -> Record:
 
 
 def take_all(sources: Any) -> list[Record]:
-    """The records of one or more runs or bundles. Raises as `take`."""
+    """Records of one or more runs or bundles. Raises as `take`."""
     several = isinstance(sources, list) or (isinstance(sources, tuple) and not isinstance(sources, Bundle))
     return [take(source) for source in (sources if several else [sources])]
 
 
 def config_of(bundle: Bundle) -> Any:
-    """Settings of the machine that a bundle was recorded with, without the code of its owner that came with it.
+    """Settings of the machine of a bundle, without the user code in the bundle.
 
-    Raises UserError where case.json does not hold them, and where the plant is the user's own.
+    Raises UserError where case.json does not hold the settings, and where the plant is user code.
     """
     from pydantic import ValidationError
 
@@ -129,9 +129,9 @@ def config_of(bundle: Bundle) -> Any:
 
 
 def steady(record: Record, settle: float = 0.5) -> list[slice]:
-    """Stretches in which the reference moves at a constant speed, each without its first `settle` s.
+    """Slices of rows in which the reference has constant speed, each without its first `settle` s.
 
-    Rows that are missing in the recording end a stretch as well.
+    A gap in the recording also ends a slice.
     """
     speed = np.diff(record["ref"]) / record.dt
     top = np.abs(speed).max() if len(speed) else 0.0
@@ -147,8 +147,8 @@ def steady(record: Record, settle: float = 0.5) -> list[slice]:
 
 
 def check(record: Record, stretches: list[slice]) -> None:
-    """Raise NoAnswer where the run tripped, or in the stretches a drive saturates, the loop runs away or the machine
-    turns back.
+    """Raise NoAnswer where the run tripped, or where in `stretches` a drive saturates, the loop is unstable or the
+    machine reverses.
     """
     if record.trip:
         raise NoAnswer(f"{record.source}: the run tripped, {record.trip} at {record.trip_time:.3f} s")
@@ -160,7 +160,7 @@ def check(record: Record, stretches: list[slice]) -> None:
 def _check_drive(record: Record, stretches: list[slice]) -> None:
     limit = record.config.law.limit
     low = -limit.high if limit.low is None else limit.low
-    board = 10.0 * (1 - 1 / 2048)  # what a 12-bit bipolar output gives at most
+    board = 10.0 * (1 - 1 / 2048)  # V, largest output of a 12-bit bipolar board
     for name in record.signals.written:
         u = record[name]
         full = (u >= min(limit.high, board) - 5e-3) | (u <= max(low, -board) + 5e-3)
@@ -169,7 +169,7 @@ def _check_drive(record: Record, stretches: list[slice]) -> None:
             share = len(at) / sum(s.stop - s.start for s in stretches)
             advice = "take a smaller excitation"
             if share > SWINGING:
-                advice = "a loop that is not stable swings like that: lower its gain, or else the excitation"
+                advice = "an unstable loop oscillates like this: lower its gain, then the excitation"
             raise NoAnswer(
                 f"{record.source}: the drive saturates, {name} is {u[at[0]]:.3g} V at {record.t[at[0]]:.3f} s, "
                 f"{len(at)} samples in all; {advice}"
@@ -177,7 +177,7 @@ def _check_drive(record: Record, stretches: list[slice]) -> None:
 
 
 def _check_stable(record: Record, stretches: list[slice]) -> None:
-    """The error may not grow from the first third to the last of a stretch: that is a loop that is not stable."""
+    """Raise NoAnswer where the error grows from the first third of a stretch to its last: the loop is unstable."""
     for s in stretches:
         e = record.error[s]
         third = len(e) // 3
@@ -192,7 +192,7 @@ def _check_stable(record: Record, stretches: list[slice]) -> None:
 
 
 def _check_sliding(record: Record, stretches: list[slice]) -> None:
-    """Speed may not change its sign: dry friction that turns damps what is measured (a resonance by a third)."""
+    """Raise NoAnswer where the speed changes its sign: reversing dry friction damps a resonance by a third."""
     if record.signals.speed not in record.columns:
         return
     speed, ref = record[record.signals.speed], record["ref"]
@@ -200,7 +200,7 @@ def _check_sliding(record: Record, stretches: list[slice]) -> None:
         against = np.flatnonzero(speed[s] * (ref[s.stop - 1] - ref[s.start]) < 0)
         if len(against) > TURNING * (s.stop - s.start):
             raise NoAnswer(
-                f"{record.source}: the machine turns back {len(against)} samples long from "
+                f"{record.source}: the machine reverses for {len(against)} samples from "
                 f"{record.t[s.start + against[0]]:.3f} s on, and dry friction with it; take less excitation, more "
                 "speed, or a law that does not raise a resonance"
             )

@@ -1,14 +1,14 @@
-"""Reel radii from the capstan's angle and the pulses of the reels, while the tape runs one way.
+"""Reel radii from the capstan angle and the reel pulses, during motion in one direction.
 
     R = R_c phi_c / phi                                                                                      (5.2)
     accuracy = (2 pi / increments) / rotation                                                                (5.3)
 
-The plain ratio takes the angles at both ends of the way, and is off by up to one pulse of the reel. The ratio between
-the first and the last counted edge leaves only what the capstan turns in a tick: it is the law that measures radii when
-a reel unit is armed, run over a recording.
+The plain ratio uses the angles at both ends of the travel; its error is up to one pulse of the reel. The ratio between
+the first and the last counted edge has only the error of the capstan rotation in a tick. This module runs the law that
+measures the radii at arming of a reel unit over a recording.
 
-The optical sensors count up in either direction, so only a way without reversal counts, and of that what lies well
-within: dry friction and an elastic tape let a reel start before the capstan and stop after it.
+The optical sensors count up in either direction, so only travel without reversal counts. Both ends of the travel are
+left out: by dry friction and an elastic tape a reel starts before the capstan and stops after it.
 
 Source: thesis 5.1, (5.2), (5.3), 6.2.
 """
@@ -23,17 +23,17 @@ from rtctl.identify.records import Record
 from rtctl.machines.profile import REELS
 
 TURN = 2.0 * np.pi
-TRAVEL = 1.9  # rad of the capstan: 5 % at the largest reel (5.3)
-LEAST = 4  # pulses; with less the ratio is off by a quarter
-RUN_IN = 0.6  # rad of the capstan behind and before a reversal, where tape and shafts turn over
-BACK = 2  # counts that an encoder may flicker back
+TRAVEL = 1.9  # rad of the capstan: accuracy of 5 % at the largest reel (5.3)
+LEAST = 4  # pulses; with fewer, the error of the ratio is a quarter
+RUN_IN = 0.6  # rad of the capstan after and before a reversal, where tape and shafts reverse their load
+BACK = 2  # counts of encoder flicker
 
 
 class Radius(NamedTuple):
     R: float  # m, between edges
-    half: float  # m, that it can be off at most by quantisation
+    half: float  # m, largest error by quantisation
     plain: float  # m, (5.2)
-    accuracy: float  # of the plain ratio, share (5.3)
+    accuracy: float  # relative error of the plain ratio (5.3)
     pulses: int
 
 
@@ -46,17 +46,17 @@ class Radii(NamedTuple):
 
 
 def accuracy(increments: float, rotation: float) -> float:
-    """Share by which a rotation (rad) measured in `increments` a turn can be off (5.3)."""
+    """Relative error of a rotation (rad) measured with `increments` per turn (5.3)."""
     return TURN / increments / abs(rotation)
 
 
 def travel_for(share: float, increments: float = 209, R_max: float = 0.04, R_c: float = 0.0125) -> float:
-    """Capstan angle in rad that measures the largest reel to a share (5.3): 1.9 rad for 5 %."""
+    """Capstan angle in rad for the relative accuracy `share` at the largest reel (5.3): 1.9 rad for 5 %."""
     return TURN / increments / share * R_max / R_c
 
 
 def radius_config(config: Any, travel: float = 3.8, speed: float = 0.5) -> Any:
-    """The config that winds `travel` rad to reel 1 and back, each way at `speed` rad/s of the capstan."""
+    """Config that winds `travel` rad to reel 1 and back, at `speed` rad/s of the capstan."""
     need(config.kind, config.name, REELS)
     back = 0.5 + travel / speed + 1.0
     steps = [{"at": 0.5, "to": travel, "ramp": speed}, {"at": back, "to": 0.0, "ramp": speed}]
@@ -64,9 +64,9 @@ def radius_config(config: Any, travel: float = 3.8, speed: float = 0.5) -> Any:
 
 
 def reel_radii(record: Record, travel: float = TRAVEL) -> list[Radii]:
-    """Radii from every way of at least `travel` rad of the capstan without reversal.
+    """Radii from every motion of at least `travel` rad of the capstan without reversal.
 
-    Raises NoAnswer where there is none, or a reel gives fewer than 4 pulses on it.
+    Raises NoAnswer where no motion is long enough, or where a reel gives fewer than 4 pulses in it.
     """
     need(record.kind, record.source, REELS)
     phi, n1, n2, t = (record[name] for name in ("capstan", "reel1_counts", "reel2_counts", "t"))
@@ -88,7 +88,7 @@ def reel_radii(record: Record, travel: float = TRAVEL) -> list[Radii]:
 
 
 def radii(phi: np.ndarray, n1: np.ndarray, n2: np.ndarray, config: Any, t: np.ndarray) -> Radii:
-    """Radii from capstan angles (rad) and pulses of one way, all (n,)."""
+    """Radii from capstan angles (rad) and pulses of one motion without reversal, all (n,)."""
     each = []
     for n, sensor in ((n1, config.sensors.reel1), (n2, config.sensors.reel2)):
         each.append(radius(phi, n, config.R_c, sensor.pulses))
@@ -96,16 +96,16 @@ def radii(phi: np.ndarray, n1: np.ndarray, n2: np.ndarray, config: Any, t: np.nd
 
 
 def radius(phi: np.ndarray, n: np.ndarray, R_c: float, pulses: int) -> Radius:
-    """Radius from capstan angles `phi` (rad) and pulse counts `n` (both (k,)) of one way.
+    """Radius from capstan angles `phi` (rad) and pulse counts `n` (both (k,)) of one motion without reversal.
 
-    Raises NoAnswer where there are fewer than 4 pulses.
+    Raises NoAnswer for fewer than 4 pulses.
     """
     from rtctl.laws import reel_edges
 
     s = np.zeros(1, reel_edges.EDGES_STATE)[0]
     s["n"] = int(n[0])
     edges = np.flatnonzero(np.diff(n)) + 1
-    for k in edges:  # between them the law only keeps up
+    for k in edges:  # between edges the law does not change its result
         reel_edges.follow.py_func(Fields(s), 0.5 * (phi[k - 1] + phi[k]), int(n[k]), 1)
     seen = int(s["n_b"] - s["n_a"])
     if seen < LEAST:
@@ -120,7 +120,7 @@ def radius(phi: np.ndarray, n: np.ndarray, R_c: float, pulses: int) -> Radius:
 
 
 class Fields:
-    """A record whose fields are attributes, as compiled code sees it."""
+    """Wrapper of a record with its fields as attributes, as in compiled code."""
 
     def __init__(self, record: Any) -> None:
         object.__setattr__(self, "_record", record)
@@ -133,7 +133,7 @@ class Fields:
 
 
 def one_way(phi: np.ndarray, flicker: float) -> list[tuple[int, int]]:
-    """Stretches [begin, end) in which `phi` goes one way but for `flicker`, from its turning point to the next."""
+    """Intervals [begin, end) of `phi` between reversals, up to `flicker`."""
     out, begin, top, way = [], 0, 0, 0.0
     for k in range(len(phi)):
         if way == 0.0:

@@ -1,10 +1,10 @@
-"""Position error of the encoder against the linear scale, and the capstan radius that its trend tells.
+"""Position error of the encoder against the linear scale, and the capstan radius from its trend.
 
     e = x - x_hat,   x by the scale,   x_hat = R_c_hat theta_m        R_c - R_c_hat = R_c_hat de/dx_hat   (11.2), (11.3)
 
 The record is taken at 500 Hz and filtered forwards and backwards with a second-order Butterworth of 50 Hz, as in the
-text. The thesis measures while a grey image is printed in steps of 1/12 mm; here the carriage runs at one speed, which
-gives the same error over the position in half a minute instead of an hour.
+thesis. The thesis measures during the print of a grey image in steps of 1/12 mm. Here the carriage runs at one speed,
+which gives the same error over position in half a minute instead of an hour.
 
 Source: thesis 11.2, figure 11.6.
 """
@@ -21,7 +21,7 @@ from rtctl.machines.profile import SCALE
 RATE = 500.0  # Hz
 CUTOFF = 50.0  # Hz
 LEAST = 0.1  # m of travel: five turns of the capstan
-BLOCK = 0.01885  # m, a turn of the capstan: what is within it is one pattern and not independent
+BLOCK = 0.01885  # m, a turn of the capstan: errors within a turn are correlated
 
 
 class Pass(NamedTuple):
@@ -35,16 +35,16 @@ class Pass(NamedTuple):
 
 class ScaleError(NamedTuple):
     slope: float  # m/m
-    half: float  # m/m, 95 %
+    half: float  # m/m, half width of the 95 % interval
     rise: float  # m, of the trend over the travel
     travel: float  # m
     radius_error: float  # m, R_c - R_c_hat
-    radius_half: float  # m, 95 %
-    periodic: float  # m, rms of what is left without the trend
+    radius_half: float  # m, half width of the 95 % interval
+    periodic: float  # m, rms of the residual of the trend
 
 
 def scale_config(config: Any, travel: float = 0.6, speed: float = 0.02) -> Any:
-    """The config that runs `travel` m at `speed` m/s, with a run-up that `passes` leaves out."""
+    """Config that runs `travel` m at `speed` m/s, plus a run-up that `passes` leaves out."""
     need(config.kind, config.name, SCALE)
     more = RUN_UP * speed  # s of it at either end
     step = {"at": 0.3, "to": travel + 2.0 * more, "ramp": speed}
@@ -55,9 +55,9 @@ RUN_UP = 0.5  # s
 
 
 def passes(record: Record, travel: float | None = None) -> list[Pass]:
-    """Every pass of at least 0.1 m at constant speed, cut to `travel` m where one is given.
+    """Passes of at least 0.1 m at constant speed, cut to `travel` m where it is given.
 
-    Raises NoAnswer where there is none, or where none is as long as `travel`.
+    Raises NoAnswer where no pass is long enough.
     """
     from scipy.signal import butter, sosfiltfilt
 
@@ -73,7 +73,7 @@ def passes(record: Record, travel: float | None = None) -> list[Pass]:
         x = encoder[rows]
         if abs(x[-1] - x[0]) < LEAST:
             continue
-        # at the scale's own counts and the encoder's, which differ: the filter takes the edges of both away
+        # scale and encoder have different counts: the filter removes both quantisation steps
         e = sosfiltfilt(sos, scale[rows] - x)
         speed = (x[-1] - x[0]) / (t[rows][-1] - t[begin])
         way = np.abs(sosfiltfilt(sos, x) - x[0])
@@ -96,10 +96,10 @@ def passes(record: Record, travel: float | None = None) -> list[Pass]:
 
 
 def scale_error(x: np.ndarray, e: np.ndarray, R_c: float) -> ScaleError:
-    """Trend of the error `e` (m, (n,)) over the encoder's position `x` (m, (n,)), with a believed radius `R_c` (m).
+    """Trend of the error `e` (m, (n,)) over the encoder position `x` (m, (n,)), for the nominal radius `R_c` (m).
 
-    A straight line by least squares. The interval counts a turn of the capstan as one sample, since what is left is a
-    pattern and no noise. Raises NoAnswer where the travel is below 0.1 m, or the trend drowns in the pattern.
+    A straight line by least squares. The interval counts a turn of the capstan as one sample: the residual is periodic
+    and no white noise. Raises NoAnswer for a travel below 0.1 m.
     """
     travel = float(np.ptp(x))
     if travel < LEAST:

@@ -9,11 +9,11 @@ reference. The coherence says how well S is known, and S how well H_p is:
 
     var S / |S|^2 = (1 - coh) / (coh n)        sd H_p = sd S / (|S|^2 |C|)
 
-n is the number of averages less what their overlap takes (Welch 1967: 1/36 of correlation for Hann at a half), and no
-more than the excitation has before it repeats: what leaks between lines repeats with it, so the coherence does not see
-it. The coherence is taken less its own bias, (1 - coh)^2 / n. To the deviation comes the bias of the window,
-S'' df^2 / 6, where S bends within a few lines, at the lowest of them. Where S is nearly 1 the loop does nothing and
-H_p is a small difference; its band says so.
+n is the effective number of averages: less the correlation of overlapping windows (Welch 1967: 1/36 for Hann at a
+half), and at most the number of windows before the excitation repeats. Leakage between lines repeats with the
+excitation, and the coherence does not show it. The bias of the coherence, (1 - coh)^2 / n, is subtracted. The bias of
+the window, S'' df^2 / 6, is added to the deviation; it matters at the lowest lines, where S curves. Where S is nearly
+1, the loop has little effect and H_p is a small difference with a wide band.
 
 Source: thesis 8.1 and 12.3; Bendat & Piersol, Random Data (2010), chapters 8 (bias) and 9.
 """
@@ -29,11 +29,11 @@ from rtctl.identify.frf import Frf, carried, motor_of, radii
 from rtctl.identify.records import Record, check, steady, take_all
 
 WINDOW = 4.096  # s
-AVERAGES = 50  # of the thesis
-LEAST = 8  # averages below which a coherence says nothing
+AVERAGES = 50  # number of windows in the thesis
+LEAST = 8  # least number of averages for a coherence
 OVERLAP = 1 / 36  # squared correlation of neighbouring Hann windows that overlap by a half
-LINES = 1 + 2 * (4 / 9 + 1 / 36)  # variance of a fit over that of independent lines, for a Hann window
-SETTLE = 1.0  # s after a turn of the reference
+LINES = 1 + 2 * (4 / 9 + 1 / 36)  # variance of a fit over its variance with independent lines, for a Hann window
+SETTLE = 1.0  # s after a reversal of the reference
 
 
 class Sensitivity(NamedTuple):
@@ -41,9 +41,9 @@ class Sensitivity(NamedTuple):
     S: np.ndarray  # (n,) complex
     coherence: np.ndarray  # (n,) of excitation and command
     S_sd: np.ndarray  # (n,) standard deviation of S, root of E|dS|^2
-    C: np.ndarray  # (n,) complex, the law's feedback, V/rad or V/m
+    C: np.ndarray  # (n,) complex, feedback of the law, V/rad or V/m
     averages: int
-    frf: Frf  # H_p at the lines that the data carry
+    frf: Frf  # H_p at sufficiently accurate lines
 
 
 def identify(
@@ -51,9 +51,9 @@ def identify(
 ) -> Sensitivity:
     """Sensitivity and process of one or more records at constant speed with `excitation.kind: noise`.
 
-    Records differ in the seed of their noise only. `band` in Hz is asked for line by line; where it is None, H_p holds
-    the lines that the data carry. `window` in s. Raises NoAnswer: record too short, no excitation, drive saturated,
-    trip, unstable loop, band not carried; UserError where records do not go together.
+    Records differ only in the seed of their noise. With `band` in Hz, H_p needs every line of the band; with None it
+    holds the sufficiently accurate lines. `window` in s. Raises NoAnswer: record too short, no excitation, drive
+    saturated, trip, unstable loop, band too inaccurate; UserError for records of different machines or settings.
     """
     records = take_all(sources)
     first, motor = _together(records)
@@ -67,7 +67,7 @@ def identify(
     f, S_ww, S_wu, S_uu = f[keep], S_ww[keep], S_wu[keep], S_uu[keep]
     S = S_wu / S_ww
     coherence = np.abs(S_wu) ** 2 / (S_ww * S_uu)
-    sure = np.maximum(coherence - (1 - coherence) ** 2 / worth, 1e-12)  # few averages make a coherence of their own
+    sure = np.maximum(coherence - (1 - coherence) ** 2 / worth, 1e-12)  # few averages bias the coherence upwards
     by_noise = np.abs(S) ** 2 * (1 - sure) / (sure * worth)
     S_sd = np.sqrt(by_noise + np.abs(_bend(S) / 6) ** 2)
     C = response.law(first.config, f, motor)
@@ -79,7 +79,7 @@ def identify(
 
 
 def _together(records: list[Record]) -> tuple[Record, int]:
-    """The first record and the motor that pulls. Raises UserError where the records do not go together."""
+    """First record and driving motor. Raises UserError for records of different machines or settings."""
     first = records[0]
     for record in records:
         e, law = record.config.excitation, record.config.law
@@ -97,7 +97,7 @@ def _rows(stretches: list[slice]) -> np.ndarray:
 
 
 def _bend(S: np.ndarray) -> np.ndarray:
-    """Second difference of S over its lines, the ends as their neighbours."""
+    """Second difference of S over its lines; the ends copy their neighbours."""
     if len(S) < 3:
         return np.zeros(len(S))
     inner = np.diff(S, 2)
@@ -107,7 +107,7 @@ def _bend(S: np.ndarray) -> np.ndarray:
 def _spectra(
     records: list[Record], stretches: list[list[slice]], n: int, least: int
 ) -> tuple[tuple[np.ndarray, ...], int, float]:
-    """f, S_ww, S_wu, S_uu over all stretches, the number of windows and how many independent ones they are worth."""
+    """f, S_ww, S_wu, S_uu over all stretches, number of windows, and effective number of independent windows."""
     from scipy.signal import csd
 
     first, hop = records[0], n // 2
@@ -141,13 +141,13 @@ def _spectra(
 def _carried(
     record: Record, frf: Frf, S_relative: np.ndarray, coherence: np.ndarray, band: tuple[float, float] | None
 ) -> Frf:
-    """The lines at which H_p is known. Where S is not, 1/S - 1 is near -1 whatever the plant, and says nothing."""
+    """H_p at sufficiently accurate lines. Where S is uncertain, 1/S - 1 is near -1 for any plant."""
     good = carried(frf.relative) & carried(S_relative)
     if band is None:
         if good.sum() < 5:
             raise NoAnswer(
-                f"{record.source}: the coherence is too low from {frf.f[0]:.3g} to {frf.f[-1]:.3g} Hz, H_p is not "
-                "known to within a half anywhere; take more excitation, a longer record or a tighter loop"
+                f"{record.source}: the coherence is too low from {frf.f[0]:.3g} to {frf.f[-1]:.3g} Hz, the "
+                "deviation of H_p is above 50 % everywhere; take more excitation, a longer record or a tighter loop"
             )
         return frf.select(good)
     inside = (frf.f >= band[0]) & (frf.f <= band[1])
@@ -156,8 +156,8 @@ def _carried(
     bad = np.flatnonzero(inside & ~good)
     if len(bad) > 0.05 * inside.sum():
         raise NoAnswer(
-            f"{record.source}: H_p is not carried from {frf.f[bad[0]]:.3g} to {frf.f[bad[-1]]:.3g} Hz: coherence down "
-            f"to {coherence[bad].min():.3f}, |S - 1| as small as {_closeness(frf, bad):.2g} of its own deviation there"
+            f"{record.source}: H_p is too inaccurate from {frf.f[bad[0]]:.3g} to {frf.f[bad[-1]]:.3g} Hz: coherence "
+            f"down to {coherence[bad].min():.3f}, |S - 1| as small as {_closeness(frf, bad):.2g} of its deviation there"
         )
     return frf.select(inside & good)
 

@@ -1,6 +1,6 @@
 """Step responses: of the reel unit by a radian (8.3), of the linear drive by 1/12 and 1/24 mm (chapter 10).
 
-What a step is judged by is `rtctl.trace.metrics`; here are the configs that make steps, and the figures over many.
+`rtctl.trace.metrics` has the metrics of a step. This module has the configs of the steps, and statistics of steps.
 
 Source: thesis 8.3, figure 8.6; chapter 10 for the printing steps; 11.1 for 4 um as more than is allowed.
 """
@@ -22,20 +22,20 @@ TWELFTH, TWENTY_FOURTH = 1e-3 / 12, 1e-3 / 24  # m
 
 
 class Steps(NamedTuple):
-    """Steps of a record by one sensor, in the order in which they come."""
+    """Steps of a record by one sensor, in time order, and their statistics."""
 
-    each: tuple[dict[str, float | None], ...]  # as step_metrics
-    by: str  # column that was judged
-    mm: float  # in one unit of position
-    mean_mm: float  # of the final error
+    each: tuple[dict[str, float | None], ...]  # from step_metrics
+    by: str  # evaluated column
+    mm: float  # mm per unit of position
+    mean_mm: float  # mean final error
     worst_mm: float
-    spread_mm: float  # deviation of the way stepped, which is what makes bands
+    spread_mm: float  # standard deviation of the step sizes, the cause of banding
     overshoot_pct: float  # largest
-    settling_s: float | None  # slowest; None where one did not settle
+    settling_s: float | None  # slowest; None where a step did not settle
 
 
 def printing_config(config: Any, size: float = TWELFTH, count: int = 24, hold: float = 0.4) -> Any:
-    """The config that makes `count` steps of `size` m, `hold` s each, and the same home again."""
+    """Config with `count` steps of `size` m, `hold` s each, and `count` steps back."""
     need(config.kind, config.name, SCALE)
     ends = [*range(1, count + 1), *range(count - 1, -1, -1)]
     steps = [{"at": 0.5 + k * hold, "to": n * size} for k, n in enumerate(ends)]
@@ -44,10 +44,10 @@ def printing_config(config: Any, size: float = TWELFTH, count: int = 24, hold: f
 
 
 def radian_config(config: Any, tau_C: float = 2.4e-3, R1: float = 0.025, R2: float = 0.035, size: float = 1.0) -> Any:
-    """The config of figure 8.6: -1 rad at once, +1 rad 3 s later, friction compensated by `tau_C` Nm.
+    """Config of figure 8.6: a jump of -1 rad, a jump of +1 rad 3 s later, friction compensation of `tau_C` Nm.
 
-    A step is a jump, as in the thesis, without the shaper and the feedforward of inertia; the friction of both motors
-    is compensated in full, at standstill too.
+    As in the thesis, shaper and inertia feedforward are off. The friction of both motors is compensated in full, also
+    at standstill.
     """
     need(config.kind, config.name, REELS)
     changes = {
@@ -64,7 +64,7 @@ def radian_config(config: Any, tau_C: float = 2.4e-3, R1: float = 0.025, R2: flo
 
 
 def steps(record: Record, by: str | None = None) -> Steps:
-    """Judge all steps of a record by the column `by`: the loop's own sensor where none is named, or `scale`.
+    """Metrics of all steps of a record by the column `by`: the loop's sensor by default, or `scale`.
 
     Raises NoAnswer where the reference makes no step.
     """
@@ -74,12 +74,12 @@ def steps(record: Record, by: str | None = None) -> Steps:
     each = step_metrics(record["t"], record["target"], record[by], mm, rad, settle_floor=record.profile.still)
     if not each:
         raise NoAnswer(f"{record.source}: the reference makes no step")
-    assert mm is not None  # our own machines move along a line
+    assert mm is not None  # ivu and ldu move along a line
     return summary(each, by, mm)
 
 
 def summary(each: Sequence[dict[str, float | None]], by: str, mm: float) -> Steps:
-    """Figures over many steps."""
+    """Statistics of several steps."""
     errors = np.array([step["final_error_mm"] for step in each], float)
     settling = [step["settling_s"] for step in each]
     return Steps(
@@ -95,12 +95,12 @@ def summary(each: Sequence[dict[str, float | None]], by: str, mm: float) -> Step
 
 
 def radius(config: Any) -> float | None:
-    """Radius of the capstan, between radians and metres; None on an axis."""
+    """Capstan radius in m, the factor from rad to m; None for an axis."""
     return float(module_of(config.kind).radius(config)) if profile_of(config.kind).encoder else None
 
 
 def usual_configs(config: Any) -> list[Any]:
-    """What the thesis plays: 1/12 and 1/24 mm on a linear drive; on a reel unit figure 8.6 (a) and (b).
+    """Configs of the thesis: 1/12 and 1/24 mm on a linear drive, figure 8.6 (a) and (b) on a reel unit.
 
     Raises UserError for another machine.
     """
@@ -111,5 +111,5 @@ def usual_configs(config: Any) -> list[Any]:
 
 
 def size_mm(one: Steps) -> float:
-    """Usual size of a record's steps, mm, from the first."""
+    """Size of the steps of a record in mm, from the first step."""
     return abs(float(one.each[0]["size"] or 0.0)) * one.mm

@@ -1,8 +1,8 @@
-"""The Stribeck curve through friction at several speeds, and only as much of it as the points carry.
+"""Fit of the Stribeck curve to friction at several speeds, with only the parameters that the points determine.
 
     F(v) = F_C + (F_S - F_C) exp(-(v / v_s)^2) + F_v v                                                        (8.3)
 
-For a given v_s it is linear in the rest, so v_s is searched on a grid, then between its points, and the rest solved.
+For a given v_s the curve is linear in the other parameters. v_s is searched on a grid, then between grid points.
 
 Source: thesis (8.3); Armstrong-Helouvry 1994.
 """
@@ -14,11 +14,11 @@ import numpy as np
 
 from rtctl.config.errors import NoAnswer
 
-CHANCE = 1e-3  # that a fall of the friction with speed is none
+CHANCE = 1e-3  # p-value below which a fall of the friction with speed is significant
 
 
 class Stribeck(NamedTuple):
-    """Fit of (8.3) in the unit of the points, 95 % intervals as half widths; None where the points do not say."""
+    """Fit of (8.3) in the unit of the points, with half widths of 95 % intervals; None where undetermined."""
 
     F_C: float
     F_S: float | None
@@ -33,9 +33,9 @@ class Stribeck(NamedTuple):
 def stribeck(v: Sequence[float], F: Sequence[float], resolution: float = 0.02, fall: bool = True) -> Stribeck:
     """Fit (8.3) through friction `F` at speeds `v` >= 0 (both (n,)), by least squares over all v_s.
 
-    F_S and v_s come out None where the points do not show a fall: less than `resolution` of F_C, less than its
-    interval, or no better a fit than a straight line. v_s alone is None where the fall lies between standstill and the
-    slowest speed. Without `fall` neither is looked for. Raises NoAnswer where there are fewer than 3 different speeds.
+    F_S and v_s are None where the points show no fall: it is less than `resolution` of F_C, less than its interval, or
+    no better a fit than a straight line. v_s alone is None where the fall lies between standstill and the slowest
+    speed. Without `fall` neither is fitted. Raises NoAnswer for fewer than 3 different speeds.
     """
     from scipy.optimize import minimize_scalar
 
@@ -55,8 +55,8 @@ def stribeck(v: Sequence[float], F: Sequence[float], resolution: float = 0.02, f
         at = float(finer.x) if finer.fun < costs[best] else float(grid[best])
         a, half, rss = _linear(x, y, at)
         near = costs <= rss * (1.0 + 4.0 / max(len(x) - 4, 1)) + 1e-30 * float(y @ y)  # 95 %: an F ratio of about 4
-        near[best] = True  # where between the points nothing is left, none is near
-        # the chance that noise makes two more parameters worth as much: that of F with 2 and n - 4 degrees of freedom
+        near[best] = True  # an exact fit between grid points leaves no grid point near
+        # p-value of an F test of two more parameters, with 2 and n - 4 degrees of freedom
         chance = (rss / max(_linear(x, y, None)[2], 1e-300)) ** (0.5 * (len(x) - 4))
         if a[1] > max(resolution * a[0], half[1]) and chance < CHANCE and not near[-1]:
             v_s, width = (None, None) if near[0] else (at, max(0.5 * float(np.ptp(grid[near])), step))

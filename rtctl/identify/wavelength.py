@@ -1,15 +1,15 @@
-"""Fourier analysis over the position: which wavelengths a position error has, and where each comes from.
+"""Fourier analysis over position: wavelengths of a position error, and the origin of each wavelength.
 
     E(lambda_k) = 1/N sum e(n) exp(-j 2 pi n dx / lambda_k),   lambda_k = x_e / k,   N = x_e / dx            (11.10)
 
-The error is laid on even steps of position, loses its trend and gets a Hann window. The highest bin that stands above
-what the neighbourhood's noise gives by chance is a line; a sine of free wavelength is fitted to it and taken away, and
-what is left is looked at again, until nothing stands out: so 150 and 300 mm are told apart though the window smears
-them into each other. All sines are fitted at once, for amplitudes and wavelengths that are not bound to the bins: the
-thesis's 18.75 mm is the bin x_e / 32 next to the 18.86 mm of the capstan.
+The error is resampled at even steps of position, detrended and windowed (Hann). The highest bin significantly above the
+surrounding noise is a line. A sine of free wavelength is fitted and subtracted, and the search repeats on the residual
+until no line is significant. This separates 150 and 300 mm, which the window smears into each other. All sines are
+fitted together: their wavelengths are not bound to the bins. The thesis's 18.75 mm is the bin x_e / 32 next to the
+18.86 mm of the capstan.
 
-One record cannot tell what repeats with position from what repeats with time. Two at different speeds can: a wavelength
-that stays belongs to the position, one that grows with the speed to the time (figure 11.7 with 11.4).
+One record cannot separate periods of position from periods of time. Two records at different speeds can: a constant
+wavelength belongs to position, a wavelength proportional to speed belongs to time (figure 11.7 with 11.4).
 
 Source: thesis (11.10), 11.2; Harris 1978 for the window; Rife & Boorstyn 1974 for the bound on the wavelength.
 """
@@ -22,17 +22,17 @@ import numpy as np
 from rtctl.config.errors import NoAnswer
 
 HANN_GAIN = 0.5  # mean of the window
-NEAR = 2  # bins that a Hann window smears one line over, to either side
-SURE = 0.999  # that no peak of a record is chance
-ROOM = 30  # bins to either side that tell the noise
-MEDIAN_WORTH = 0.32  # of a bin, in a median (0.48) of bins that the window smears over 1.5
+NEAR = 2  # width of a line under a Hann window, in bins to either side
+SURE = 0.999  # confidence that no peak of a record is noise
+ROOM = 30  # bins to either side for the noise level
+MEDIAN_WORTH = 0.32  # effective share of a bin in a median (0.48), with bins correlated over 1.5 by the window
 
 
 class Spectrum(NamedTuple):
     wavelength: np.ndarray  # m, (N/2,), x_e / k for k = 1 .. N/2
     E: np.ndarray  # m, complex (N/2,), (11.10) as printed, with the window
-    amplitude: np.ndarray  # m, (N/2,), of a sine that would give it: 2 |E| / (mean of the window)
-    noise: np.ndarray  # m, (N/2,), the same of the noise around
+    amplitude: np.ndarray  # m, (N/2,), amplitude of the equivalent sine: 2 |E| / (mean of the window)
+    noise: np.ndarray  # m, (N/2,), amplitude of the surrounding noise
     x: np.ndarray  # m, (N,)
     e: np.ndarray  # m, (N,), without trend, before the window
 
@@ -40,16 +40,16 @@ class Spectrum(NamedTuple):
 class Peak(NamedTuple):
     bin: float  # m, wavelength of the bin, as in the thesis
     wavelength: float  # m, fitted
-    half: float  # m, 95 %
+    half: float  # m, half width of the 95 % interval
     amplitude: float  # m, fitted
-    amplitude_half: float  # m, 95 %
+    amplitude_half: float  # m, half width of the 95 % interval
     phase: float  # rad, of a sine at x = 0
-    confidence: float  # that it is no chance
-    order: float | None  # times a turn of the capstan
+    confidence: float  # that the peak is no noise
+    order: float | None  # periods per turn of the capstan
 
 
 class Origin(NamedTuple):
-    """A peak of one speed and its fellow at the other."""
+    """Peak at one speed and its counterpart at the other speed."""
 
     kind: Literal["position", "time", "either", "neither"]
     wavelength: float  # m, at the first speed
@@ -58,7 +58,7 @@ class Origin(NamedTuple):
 
 
 def spectrum(x: np.ndarray, e: np.ndarray, N: int = 1200, x_e: float | None = None) -> Spectrum:
-    """(11.10) for the error `e` (m, (n,)) over rising positions `x` (m, (n,)), on `N` steps over `x_e` m.
+    """Spectrum by (11.10) of the error `e` (m, (n,)) over rising positions `x` (m, (n,)), in `N` steps over `x_e` m.
 
     Raises NoAnswer where the record is shorter than `x_e` or has fewer than `N` samples.
     """
@@ -69,7 +69,7 @@ def spectrum(x: np.ndarray, e: np.ndarray, N: int = 1200, x_e: float | None = No
     if len(x) < N:
         raise NoAnswer(f"{len(x)} samples over {1e3 * length:.0f} mm do not fill {N} steps")
     grid = x[0] + x_e * np.arange(N) / N
-    order = np.maximum.accumulate(x)  # a count may flicker back
+    order = np.maximum.accumulate(x)  # the encoder may flicker by a count
     y = np.interp(grid, order, e)
     y = y - np.polyval(np.polyfit(grid, y, 1), grid)
     E = _hann(y)
@@ -78,9 +78,9 @@ def spectrum(x: np.ndarray, e: np.ndarray, N: int = 1200, x_e: float | None = No
 
 
 def peaks(s: Spectrum, R_c: float | None = None, most: int = 12) -> tuple[Peak, ...]:
-    """Peaks of a spectrum, longest wavelength first; `R_c` (m) gives their order.
+    """Peaks of a spectrum, longest wavelength first; the capstan radius `R_c` (m) gives their order.
 
-    Raises NoAnswer where nothing stands above the noise.
+    Raises NoAnswer where no peak exceeds the noise.
     """
     periods = np.zeros(0)
     confidences: list[float] = []
@@ -89,7 +89,7 @@ def peaks(s: Spectrum, R_c: float | None = None, most: int = 12) -> tuple[Peak, 
         amplitude = 2.0 * np.abs(_hann(left)) / HANN_GAIN
         noise, sure = confidence(amplitude)
         top = int(np.argmax(amplitude / noise))
-        close = np.abs(periods - (top + 1)) < 1.0  # what is left of a line that is no pure sine
+        close = np.abs(periods - (top + 1)) < 1.0  # residual of a line that is no pure sine
         if sure[top] < SURE or close.any():
             break
         periods = np.append(periods, top + 1.0)
@@ -116,9 +116,9 @@ def peaks(s: Spectrum, R_c: float | None = None, most: int = 12) -> tuple[Peak, 
 
 
 def origin(first: Sequence[Peak], speed: float, second: Sequence[Peak], other: float) -> tuple[Origin, ...]:
-    """What each peak of the `first` record (at `speed` m/s) goes with, by its fellow in the `second` (at `other` m/s).
+    """Origin of each peak of `first` (at `speed` m/s): position, time, either or neither, by `second` (at `other` m/s).
 
-    Raises NoAnswer where the speeds are so alike that a peak could be both.
+    Raises NoAnswer where the speeds are too alike to separate position from time.
     """
     if abs(np.log(other / speed)) < np.log(1.2):
         raise NoAnswer(f"speeds of {speed:g} and {other:g} m/s are too alike; take one 1.2 times the other or more")
@@ -134,7 +134,7 @@ def origin(first: Sequence[Peak], speed: float, second: Sequence[Peak], other: f
 
 
 def _fellow(second: Sequence[Peak], peak: Peak, wavelength: float) -> Peak | None:
-    """The peak of the second record at a wavelength, within what both can resolve."""
+    """Peak of the second record at `wavelength`, within the resolution of both records; None without one."""
     best = min(second, key=lambda p: abs(np.log(p.wavelength / wavelength)), default=None)
     if best is None:
         return None
@@ -143,10 +143,10 @@ def _fellow(second: Sequence[Peak], peak: Peak, wavelength: float) -> Peak | Non
 
 
 def confidence(amplitude: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Noise around every bin (its Rayleigh parameter), and how sure it is that a bin is no chance, both (k,).
+    """Rayleigh parameter of the noise around every bin, and confidence that a bin is no noise, both (k,).
 
-    The noise is the median of the bins around but for its own line. It is itself uncertain, which makes the tail of the
-    ratio that of an F distribution, P = (1 + r^2 / 2 m)^-m, with m the number of bins that a median is worth.
+    The noise is estimated by the median of the surrounding bins without the bin's own line. By the uncertainty of the
+    estimate, the ratio r has the tail P = (1 + r^2 / 2 m)^-m of an F distribution; m is the effective number of bins.
     """
     count = len(amplitude)
     noise, worth = np.empty(count), np.empty(count)
@@ -161,15 +161,15 @@ def confidence(amplitude: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 class Sines(NamedTuple):
-    periods: np.ndarray  # (n,) in the length of the record
-    periods_half: np.ndarray  # (n,) 95 %
+    periods: np.ndarray  # (n,) periods in the length of the record
+    periods_half: np.ndarray  # (n,) half widths of the 95 % intervals
     sin_cos: np.ndarray  # m, (n, 2)
     amplitude_half: np.ndarray  # m, (n,) 95 %
-    rest: np.ndarray  # m, (N,)
+    rest: np.ndarray  # m, (N,), residual
 
 
 def _sines(s: Spectrum, start: np.ndarray) -> Sines:
-    """Sines of free wavelength, all fitted at once with a new trend, by variable projection (Golub & Pereyra 1973)."""
+    """Sines of free wavelength, fitted together with a new trend by variable projection (Golub & Pereyra 1973)."""
     from scipy.optimize import least_squares
 
     u = s.x / s.wavelength[0]
@@ -190,7 +190,7 @@ def _sines(s: Spectrum, start: np.ndarray) -> Sines:
     slopes = 2.0 * np.pi * u[:, None] * (M[:, n : 2 * n] * a[:n] - M[:, :n] * a[n : 2 * n])
     J = np.column_stack((M, slopes))
     r = s.e - M @ a
-    # what is left is smooth: it has as many independent samples as it changes sign, not as there are steps
+    # the residual is smooth: its number of independent samples is its number of sign changes
     independent = max(np.count_nonzero(np.diff(np.sign(r)) != 0) - J.shape[1], 1)
     scale = np.linalg.norm(J, axis=0)
     covariance = np.linalg.pinv((J / scale).T @ (J / scale)) * float(r @ r) / independent
@@ -200,7 +200,7 @@ def _sines(s: Spectrum, start: np.ndarray) -> Sines:
 
 
 def _hann(y: np.ndarray) -> np.ndarray:
-    """(11.10) of `y` (N,) under the window, for k = 1 .. N/2."""
+    """Fourier transform (N/2,) by (11.10) of `y` (N,) with Hann window, for k = 1 .. N/2."""
     N = len(y)
     window = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(N) / N)
     return np.fft.rfft(window * y)[1:] / N

@@ -1,4 +1,4 @@
-"""The proof: concealed cases made by equations of their own, sealed, diagnosed, scored.
+"""Proof: blind test of the diagnosis on concealed cases, which are generated, sealed, diagnosed and scored.
 
-Nothing here shares code with plants/, drivers/ or rtctl/diagnose: what is wrong there must not be wrong here alike.
+This package shares no code with plants/, drivers/ or rtctl/diagnose: an error in their equations is not repeated here.
 """

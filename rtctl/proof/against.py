@@ -1,4 +1,4 @@
-"""Two programs on the same concealed cases, case by case: what each answered, and which of the answers are right."""
+"""Comparison of the answers of two programs to the same concealed cases, case by case."""
 
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -19,7 +19,7 @@ WORDS = {
 
 
 class Pair(NamedTuple):
-    """A case that the two programs answer differently."""
+    """Case with different answers of the two programs."""
 
     case: str
     truth: str
@@ -29,7 +29,7 @@ class Pair(NamedTuple):
 
 
 def pairs(folder: Path, before: Path) -> list[Pair]:
-    """Cases that both folders have an answer to, and answer differently.
+    """Cases that both folders answer, with different answers.
 
     Raises UserError where the folders hold different cases.
     """
@@ -48,13 +48,13 @@ def pairs(folder: Path, before: Path) -> list[Pair]:
 
 
 def said(diagnosis: Json) -> str:
-    """Verdict, and names with their nodes."""
+    """Text of a diagnosis: verdict, and names with their nodes."""
     names = [f"{e['name']}:{e['node']}" for e in diagnosis.get("effects") or []]
     return " ".join([str(diagnosis["verdict"]), *names])
 
 
 def words(found: list[Pair]) -> str:
-    """A table of the cases that differ, and how many are better and worse."""
+    """Table of the cases that differ, and numbers of better and worse answers."""
     if not found:
         return "both programs answer all cases alike"
     counts = ", ".join(f"{n} {word}" for word in WORDS.values() if (n := sum(p.change == word for p in found)))

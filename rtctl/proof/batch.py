@@ -1,4 +1,4 @@
-"""Many concealed cases side by side, written once each, then sealed; an interrupted run goes on where it stopped."""
+"""Parallel generation and sealing of concealed cases; an interrupted run continues where it stopped."""
 
 import json
 import os
@@ -14,9 +14,9 @@ from rtctl.config.files import write_text
 from rtctl.proof import seal
 
 PLANTS = ("ivu", "ldu", "axis")
-MIX = "proof seed {0}"  # of the plants, in answers.json
+MIX = "proof seed {0}"  # entry `mix` of answers.json for the plants
 MACHINES_MIX = "proof of machines, seed {0}"
-DRAFT = ".unsealed"  # answers of the cases written so far; gone when they are sealed
+DRAFT = ".unsealed"  # answers of the cases written so far; deleted at sealing
 
 Progress = Callable[[int, int], None]
 Write = Callable[..., tuple[str, dict[str, Any]]]  # (folder, seed, number, which, heldout) -> name, answer
@@ -28,9 +28,9 @@ def batch(
 ) -> Path:  # fmt: skip
     """Write `count` cases with `write`, their answers and the seal into `folder`, and return it.
 
-    `order` is what an interrupted run must have been started with; `task` is (seed, which, heldout); `mix` and `form`
-    stand in answers.json. `progress` is called with the cases done and `count`. Raises UserError for a folder that
-    holds other cases and for no cases.
+    An interrupted run continues only with an equal `order`. `task` is (seed, which, heldout); `mix` and `form` go into
+    answers.json. `progress` is called with the number of finished cases and `count`. Raises UserError for a folder with
+    other cases and for `count` 0.
     """
     if count < 1:
         raise UserError(f"count is {count}; at least one case is needed")
@@ -57,7 +57,7 @@ def batch(
 
 
 def begin(folder: Path, order: dict[str, Any]) -> dict[str, Any]:
-    """Answers of an interrupted run of the same order, by case; starts a new one where the folder is empty."""
+    """Answers by case of an interrupted run with the same order; starts a new run in an empty folder."""
     draft = folder / DRAFT
     if any(folder.glob("case-*")) and not (draft / "order.json").is_file():
         raise UserError(f"{folder} holds cases already; name another folder")

@@ -1,6 +1,6 @@
-"""Compile the true machine once and keep it on disk, under a name made of every source that goes into it.
+"""Compilation of the true machine with a cache on disk, keyed by all its sources.
 
-Numba looks at the file of a cached function alone, and would run an old equation after a change in another file.
+Numba checks only the file of a cached function, and would run an old equation after a change in another file.
 """
 
 import hashlib
@@ -14,7 +14,7 @@ SOURCES = ("machine", "law", "forces", "solver")
 
 
 def compiler(sources: Iterable[Path]) -> Callable[[Callable[..., Any]], Any]:
-    """Decorator: IEEE arithmetic in program order, no Python lock, kept in the cache until one of `sources` changes."""
+    """Compiling decorator: IEEE arithmetic in program order, no GIL, cached until one of `sources` changes."""
     key = hashlib.sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()[:10]
 
     def compiled(function: Callable[..., Any]) -> Any:

@@ -1,4 +1,4 @@
-"""Controllers that an owner would have: gains drawn around the thesis's, and the note that says the law in full."""
+"""Controllers of the cases: gains drawn around those of the thesis, and a note with the complete law."""
 
 import math
 from typing import Any
@@ -32,7 +32,7 @@ AXIS_PD = (
 
 
 def ivu(rng: np.random.Generator) -> tuple[dict[str, Any], str]:
-    """PD with one of four allocations."""
+    """Controller of the reel unit: PD with one of four allocations."""
     P = rng.uniform(3.2, 5.4)
     how = rng.choice(["differential", "pull", "motor1", "motor2"], p=[0.5, 0.25, 0.125, 0.125])
     controller = {
@@ -45,7 +45,7 @@ def ivu(rng: np.random.Generator) -> tuple[dict[str, Any], str]:
 
 
 def ldu(rng: np.random.Generator, heavy: bool) -> tuple[dict[str, Any], str]:
-    """PD, PI with velocity, or lead-lag with low-pass and notch, as sections at 10 kHz."""
+    """Controller of the linear drive at 10 kHz: PD, PI with velocity, or lead-lag with low-pass and notch."""
     Ts = 1e-4
     scale = (2.0 if heavy else 1.0) * rng.uniform(0.8, 1.15)
     kind = str(rng.choice(["pd", "pi_velocity", "lead_lag"]))
@@ -69,7 +69,7 @@ def ldu(rng: np.random.Generator, heavy: bool) -> tuple[dict[str, Any], str]:
 
 
 def axis(rng: np.random.Generator, M: float, K: float, delay: float) -> tuple[dict[str, Any], str]:
-    """Cascade as in the EMPS benchmark, or PD; bandwidth from the mass."""
+    """Controller of the axis: cascade as in the EMPS benchmark, or PD; bandwidth from the mass."""
     speed = rng.uniform(70.0, 120.0) / (1.0 + 0.4 * delay)
     kv = speed * M / K
     kp = speed * rng.uniform(0.3, 0.6)
@@ -97,20 +97,20 @@ def pd_section(P: float, D: float, f: float, Ts: float) -> list[float]:
 
 
 def pid_section(P: float, I: float, D: float, f: float, Ts: float) -> list[float]:  # noqa: E741
-    """P + I Ts / (1 - z^-1) + D filtered difference, over one denominator."""
+    """Section [b0, b1, b2, a1, a2] of P + I Ts / (1 - z^-1) + D filtered difference."""
     a = 1.0 - math.exp(-2.0 * math.pi * f * Ts)
     r, g = 1.0 - a, D * a / Ts
     return [P + I * Ts + g, -P * (1.0 + r) - I * Ts * r - 2.0 * g, P * r + g, -1.0 - r, r]
 
 
 def first_order(k: float, zero: float, pole: float, Ts: float) -> list[float]:
-    """k (1 + zero s) / (1 + pole s), bilinear."""
+    """Section [b0, b1, b2, a1, a2] of k (1 + zero s) / (1 + pole s), bilinear."""
     n, d = 2.0 * zero / Ts, 2.0 * pole / Ts
     return [k * (1.0 + n) / (1.0 + d), k * (1.0 - n) / (1.0 + d), 0.0, (1.0 - d) / (1.0 + d), 0.0]
 
 
 def second_order(num: tuple[float, float, float], zeta: float, f: float, Ts: float) -> list[float]:
-    """(n2 s^2 + 2 n1 w s + n0 w^2) / (s^2 + 2 zeta w s + w^2), bilinear with the frequency kept."""
+    """Section of (n2 s^2 + 2 n1 w s + n0 w^2) / (s^2 + 2 zeta w s + w^2), bilinear with prewarping."""
     c = 1.0 / math.tan(math.pi * f * Ts)
     n2, n1, n0 = num
     d0 = c * c + 2.0 * zeta * c + 1.0

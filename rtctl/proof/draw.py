@@ -1,8 +1,8 @@
-"""What case number i of a seed holds: its kind, plant, effects and sizes. Depends on (seed, i, plants) alone.
+"""Plan of case number i of a seed: kind, plant, effects and sizes. Depends only on (seed, i, plants).
 
 Twenty cases make a deck: five without missing physics (two plain, two with parameters at the edge of their tolerance,
-one decoy), seven singles (sizes 1, 1, 1, 0.3, 0.3, 0.3, 0.1), four pairs, one triple, three unknown. Singles go through
-every name on every plant before one comes again.
+one decoy), seven singles (sizes 1, 1, 1, 0.3, 0.3, 0.3, 0.1), four pairs, one triple, three unknown. Singles use every
+name on every plant once before any repetition.
 """
 
 from typing import Any, NamedTuple
@@ -78,7 +78,7 @@ def _part(rng: np.random.Generator, plant: str, name: str, size: Any) -> Part:
 
 
 def _several(rng: np.random.Generator, plant: str, count: int, size: Any) -> tuple[Part, ...]:
-    """Effects of different families or nodes: two of one family at one node would be one curve in the machine."""
+    """Effects of different families or nodes: two of one family at one node could not be distinguished."""
     names = [n for n in names_on(plant) if n not in NOT_TOGETHER]
     found: list[Part] = []
     while len(found) < count:

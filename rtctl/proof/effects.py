@@ -1,8 +1,8 @@
-"""Every name of the table as a change of the true machine: friction, drives, clock, loads and sensors.
+"""Effects of the table, first half: friction, drives, clock, loads and sensors, as changes of the true machine.
 
-An effect is a function of (setup, node, size, rng) that changes the setup and returns what the answers say. `size` 1
-is what such machines typically show; the draw around it is log-uniform. `rich` forms are richer than a tool's library
-would have them: LuGre for presliding, three harmonics, two relaxations, smooth backlash, heat with a time constant.
+An effect is a function of (setup, node, size, rng) that changes the setup and returns the sizes for the answers. `size`
+1 is a typical amplitude; the draw around it is log-uniform. `rich` forms have more detail than a tool's library: LuGre
+for presliding, three harmonics, two relaxations, smooth backlash, heat with a time constant.
 """
 
 import math
@@ -22,9 +22,9 @@ Maker = Callable[[Setup, str, float, np.random.Generator], Sizes]
 @dataclass(frozen=True)
 class Entry:
     make: Maker
-    nodes: Mapping[str, tuple[str, ...]]  # per plant, where it can stand
+    nodes: Mapping[str, tuple[str, ...]]  # plant -> possible nodes
     axes: tuple[str, ...]
-    alike: dict[str, tuple[str, ...]]  # "plant:node" or plant -> other nodes that count as right
+    alike: dict[str, tuple[str, ...]]  # "plant:node" or plant -> nodes that count as right
     rich: bool = False
 
 
@@ -48,7 +48,7 @@ def effect(
 
 
 def about(rng: np.random.Generator, value: float, spread: float = 0.35) -> float:
-    """Log-uniform within e^+-spread of a typical value."""
+    """Log-uniform random number within a factor e^+-spread of `value`."""
     return value * math.exp(rng.uniform(-spread, spread))
 
 
@@ -65,12 +65,12 @@ def drive_of(s: Setup, node: str) -> int:
 
 
 def to_force(s: Setup) -> float:
-    """What turns N and m at the carriage into the node's own Nm and rad: R_c for the linear drive, else 1."""
+    """Factor from N and m at the carriage to Nm and rad of the node: R_c for the linear drive, else 1."""
     return s.truth["R_c"] if s.plant == "ldu" else 1.0
 
 
 def level(s: Setup, node: str) -> float:
-    """Dry friction that the machine's scale is measured by, at a node."""
+    """Dry friction at a node (Nm or N), the scale of effect sizes."""
     own = float(s.m["q_F_C"][index(s, node)])
     return own if own > 0.0 and s.plant != "axis" else max(own, 0.35 * s.span["torque"])
 
@@ -113,7 +113,7 @@ def stribeck(s: Setup, node: str, size: float, rng: np.random.Generator) -> Size
 
 @effect("friction.presliding", DRY, ("position", "velocity", "angle"), rich=True)
 def presliding(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
-    """Bristles that bend before they slide: Dahl's, or LuGre's with a small Stribeck rise."""
+    """Presliding friction: Dahl, or LuGre with a small Stribeck rise."""
     i, f = index(s, node), to_force(s)
     travel = about(rng, {"ivu": 0.03, "ldu": 0.02 * s.span["q"] + 2e-5 / f, "axis": 3e-5}[s.plant]) * size
     F = max(float(s.m["q_F_C"][i]), 0.5 * level(s, node))
@@ -137,7 +137,7 @@ def asymmetry(s: Setup, node: str, size: float, rng: np.random.Generator) -> Siz
 @effect("friction.load", {"ivu": ("motor1", "motor2", "capstan")}, ("tension", "velocity"),
         {"ivu:motor1": ("motor1", "reel1"), "ivu:motor2": ("motor2", "reel2")})  # fmt: skip
 def load(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
-    """mu r |T|: the bearing of a motor carries its tape, that of the capstan both."""
+    """Friction mu r |T|: the bearing of a motor carries its tape, the bearing of the capstan both tapes."""
     i = index(s, node)
     arm = about(rng, 6e-3 if node != "capstan" else 2e-3) * size
     s.m["q_mu_load"][i] = arm
@@ -191,7 +191,7 @@ def lag(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
 @effect("drive.supply_sag", {"ivu": ("drive1", "drive2"), "ldu": ("drive",)}, ("command",),
         {"ivu": ("drive1", "drive2", "loop"), "ldu": ("drive", "loop")}, rich=True)  # fmt: skip
 def supply_sag(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
-    """Both drives hang on one supply: gain falls with all the current drawn, after a capacitor's time constant."""
+    """Common supply of both drives: gain falls with the total current, after a capacitor's time constant."""
     per_A = about(rng, 0.25) * size / (float(s.m["d_amp"][0]) * s.span["u_top"])
     s.m["d_sag"][:] = per_A
     s.m["d_sag_tau"][:] = float(rng.choice([0.0, 0.02]))
@@ -220,7 +220,7 @@ def delay(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
 
 @effect("timing.jitter", LOOP, ("time",), rich=True)
 def jitter(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
-    """Ticks off their times, symmetric or late ones; the clock in the record tells of it or does not."""
+    """Deviations of the tick times, symmetric or only late; the recorded clock shows them or not."""
     rms = about(rng, {"ivu": 0.15, "ldu": 0.25, "axis": 0.12}[s.plant]) * s.Ts * size
     s.hidden.jitter_s = rms
     s.hidden.jitter_skew = float(rng.choice([0.0, 1.0]))
@@ -248,7 +248,7 @@ def imbalance(s: Setup, node: str, size: float, rng: np.random.Generator) -> Siz
 
 @effect("load.bump", {"ldu": ("carriage",), "axis": ("carriage",)}, ("position", "angle"), rich=True)
 def bump(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
-    """A local drag (dirt), or a hump that pushes back and then on (a rail joint)."""
+    """Local friction (dirt), or a bump that pushes back and then forward (a rail joint)."""
     i, f = index(s, node), to_force(s)
     at = rng.choice(s.ref[np.abs(np.gradient(s.ref)) > 0.2 * s.span["v"] * f * s.Ts]) if s.n else 0.0
     force = about(rng, 1.0 * level(s, node)) * size
@@ -270,7 +270,7 @@ def missed_counts(s: Setup, node: str, size: float, rng: np.random.Generator) ->
 @effect("sensor.scale", {"ldu": ("scale",), "ivu": ("capstan",)}, ("position",),
         {"ldu": ("encoder", "scale", "capstan"), "ivu": ("capstan", "encoder", "reel1", "reel2")})  # fmt: skip
 def scale(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
-    """A factor in the scale's reading; on the reels' unit a capstan (and its counts) that is far off the reels'."""
+    """Scale factor of a reading; on the reel unit, of the capstan (and its counts) against the reels."""
     relative = sign(rng) * about(rng, 6e-4 if s.plant == "ldu" else 0.06) * size
     s.m["y_relative"][1 if s.plant == "ldu" else 0] = 1.0 + relative
     return {"relative": relative}

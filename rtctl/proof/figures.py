@@ -1,4 +1,4 @@
-"""Two pictures of the scores: how far a confidence can be relied on, and what was answered to each truth."""
+"""Figures of the scores: reliability diagram of the confidence, and confusion matrix."""
 
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ REST = ("ambiguous", "unnamed", "nothing", "missing")  # answers without a singl
 
 
 def reliability(R: Json, path: Path) -> None:
-    """Share of names that were right over the confidence they were given, with 95 % intervals (Wilson) and counts."""
+    """Reliability diagram: share of right names over their confidence, with 95 % intervals (Wilson) and counts."""
     bins = R["calibration"]["table"]
     figure = Figure(figsize=(5.2, 4.4), layout="constrained")
     axes = figure.subplots()
@@ -33,7 +33,7 @@ def reliability(R: Json, path: Path) -> None:
 
 
 def confusion(R: Json, path: Path) -> None:
-    """Truths of a single effect or none by answers; a cell holds cases, its shade their share of the row."""
+    """Confusion matrix of cases with one effect or none; a cell has the number of cases, its shade the row share."""
     truths = [t for t in R["confusion"] if "+" not in t]
     truths.sort(key=lambda t: (t == "unknown", t in NOTHING_MISSING, t))
     given = {answer for t in truths for answer in R["confusion"][t]}
@@ -55,7 +55,7 @@ def confusion(R: Json, path: Path) -> None:
 
 
 def _frame(i: int, j: int) -> Any:
-    """Around a cell that is right."""
+    """Frame around the cell of a right answer."""
     from matplotlib.patches import Rectangle
 
     return Rectangle((j - 0.5, i - 0.5), 1, 1, fill=False, edgecolor=INK, linewidth=1.2)

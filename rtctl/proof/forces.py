@@ -1,8 +1,8 @@
-"""Right-hand side of the true machine: springs, tape contact, dry friction and everything else that pushes a node.
+"""Right-hand side of the true machine: springs, tape contact, dry friction and other forces on nodes.
 
-Dry friction has three laws. The elastic stop follows the displacement since the step began and is cut at the level, so
-that it needs no small step and does not creep. The exponential bristle (Dahl 1968, LuGre with the Stribeck level:
-Canudas de Wit 1995) is solved over the displacement in closed form. The steep one is a level times tanh(v / v_eps).
+Dry friction has three laws. The elastic stop follows the displacement since the start of the step and is limited at the
+level: it needs no small step and does not creep. The exponential bristle (Dahl 1968, LuGre with the Stribeck level:
+Canudas de Wit 1995) is solved over the displacement in closed form. The steep law is a level times tanh(v / v_eps).
 """
 
 import numpy as np
@@ -10,8 +10,8 @@ import numpy as np
 from rtctl.proof.compiled import compiled
 from rtctl.proof.machine import DAHL, NH, NQ, NS, STOP
 
-QV, BR, SLIP, NX = NQ, 2 * NQ, 2 * NQ + 2 * NS, 2 * NQ + 2 * NS + 1  # where speeds, branches and tape slip start
-LOCK = 0.5  # of the tension that a node's friction sees, from each side
+QV, BR, SLIP, NX = NQ, 2 * NQ, 2 * NQ + 2 * NS, 2 * NQ + 2 * NS + 1  # first speed, branch and tape slip; length
+LOCK = 0.5  # share of the tension of each side that loads a node's friction
 
 
 @compiled
@@ -50,7 +50,7 @@ def dry_friction(m, i, v, dq, z0, load, spot, warm):
 
 @compiled
 def spring_force(m, s, x, xs, slip):
-    """(force, arm at i, arm at j, elastic force before the limit) of spring `s` at state `x`."""
+    """Spring `s` at state `x`: force, arm at i, arm at j, and elastic force before the limit."""
     i, j = int(m.s_i[s]), int(m.s_j[s])
     qi, vi = x[i], x[QV + i]
     ri = m.s_a_i[s] + m.s_grow_i[s] * qi
@@ -98,7 +98,7 @@ def spring_force(m, s, x, xs, slip):
 
 @compiled
 def rate(m, x, q0, z0, xs, current, heat, push, spot, ring, det, dx, F, net):
-    """Fill dx (NX) at state x; F (NS) gets the spring forces and net (NQ) their torques on the nodes."""
+    """State derivative: fills dx (NX) at state x, F (NS) with spring forces, net (NQ) with their node torques."""
     nq, ns = int(m.nq), int(m.ns)
     for i in range(nq):
         net[i] = 0.0
@@ -148,9 +148,9 @@ def rate(m, x, q0, z0, xs, current, heat, push, spot, ring, det, dx, F, net):
 
 @compiled
 def _slide(m, x, F, net, dx, contact, k_sum, ns):
-    """Tape that slides on its roller (node 4) so that the contact carries no more than the limit, or creeps."""
+    """Slip of the tape on its roller (node 4): it limits the contact force, or creeps."""
     grip = m.cap_creep * abs(x[QV + 4])
-    rate_ = grip * contact / (1.0 + grip * k_sum)  # what the contact carries, damping and all
+    rate_ = grip * contact / (1.0 + grip * k_sum)  # creep at the contact force with damping
     if abs(contact) > m.cap_limit:
         rate_ += (contact - np.sign(contact) * m.cap_limit) / k_sum
     dx[SLIP] = rate_
@@ -166,7 +166,7 @@ def _slide(m, x, F, net, dx, contact, k_sum, ns):
 
 @compiled
 def other(m, i, q, v, det):
-    """Torque of what depends on one node's position and speed alone."""
+    """Torque on node `i` of effects that depend only on its position and speed."""
     f = 0.0
     for n in range(4):
         if m.wave_a[i, n] != 0.0:

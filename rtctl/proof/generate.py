@@ -1,7 +1,7 @@
-"""Concealed cases: draw, simulate with and without, see that the effect shows, write the bundle, keep the answer.
+"""Generation of concealed cases: draw, simulation with and without effects, check of visibility, bundle, answer.
 
-A case depends on (seed, number, plants) alone. The same noise acts with and without the effect, so that the change is
-the effect's; `ratio` is its rms over the rms that another noise makes, the larger of the channels.
+A case depends only on (seed, number, plants). Equal noise acts with and without the effect: the effect alone causes the
+change. `ratio` is the rms change over the rms change by another noise seed, of the channel where it is largest.
 """
 
 import copy
@@ -21,16 +21,16 @@ from rtctl.proof.machine import NQ, NU, NY
 from rtctl.proof.setup import Setup, draws
 from rtctl.proof.unknown import UNKNOWN
 
-ATTEMPTS, SIZES_TRIED = 6, 2  # machines, and draws of sizes for each
-WANT = {"unknown": 6.0}  # ratio that a case should reach, else 4, or 1 at a tenth of the size
-TOO_PLAIN, PLAIN = 120.0, 45.0  # ratio of unknown physics above which it is made smaller, and what for
+ATTEMPTS, SIZES_TRIED = 6, 2  # number of machines, and of draws of sizes for each
+WANT = {"unknown": 6.0}  # least ratio of a case by kind; else 4, or 1 at a tenth of the size
+TOO_PLAIN, PLAIN = 120.0, 45.0  # ratio of unknown physics above which it is reduced, and its target
 SATURATED = 0.3  # share of ticks at the limit above which a case is redrawn
 
 Run = dict[str, np.ndarray]
 
 
 def simulate(s: Setup, seed: list[int]) -> Run | None:
-    """Columns of a recording and the true times, or None where the loop ran away."""
+    """Columns of a recording and the true times; None where the loop was unstable."""
     a = draws(s, seed)
     y, u, start = np.zeros((s.n, NY)), np.zeros((s.n, NU)), np.zeros(2 * NQ)
     assert s.law is not None
@@ -59,7 +59,7 @@ def quantum(s: Setup, name: str) -> float:
 
 
 def floors(s: Setup, a: Run, b: Run) -> dict[str, float]:
-    """rms per channel that noise alone makes, at least that of the quantum."""
+    """Noise floor per channel: rms difference of two noise seeds, at least the rms of the quantum."""
     return {
         c: max(float(np.sqrt(np.mean((a[c] - b[c]) ** 2) / 2.0)), quantum(s, c) / math.sqrt(12.0)) for c in channels(s)
     }
@@ -78,7 +78,7 @@ def largest(seen: dict[str, dict[str, float]]) -> float:
 
 
 def healthy(s: Setup, run: Run | None) -> bool:
-    """The loop holds: finite, follows its reference, not at its limits, not chattering."""
+    """Whether the loop works: finite, follows its reference, not saturated, no chattering."""
     if run is None:
         return False
     assert s.law is not None
@@ -92,7 +92,7 @@ def healthy(s: Setup, run: Run | None) -> bool:
 
 
 def sound(p: draw.Plan, seed: list[int]) -> tuple[Setup, Run, Run, int] | None:
-    """A machine without missing physics, its run with two noises; the loop's gain is lowered until it holds."""
+    """Machine without missing physics, its runs with two noise seeds, and number of gain reductions until it works."""
     rng = np.random.default_rng(seed)
     s = plants.BUILD[p.plant](rng, p.how, p.kind == "parameters", p.decoy == "controller")
     if p.plant == "ldu" and len(s.sensors) == 1 and any(
@@ -118,7 +118,7 @@ def sound(p: draw.Plan, seed: list[int]) -> tuple[Setup, Run, Run, int] | None:
 
 
 def lower_gain(s: Setup) -> None:
-    """Take the loop's gain down by a quarter, in the case and in the law."""
+    """Reduce the gain of the loop by a quarter, in the case and in the law."""
     from rtctl.proof.law import from_case
 
     c = s.case["controller"]
@@ -139,7 +139,7 @@ def lower_gain(s: Setup) -> None:
 
 
 def measure_span(s: Setup, run: Run) -> None:
-    """Amplitudes of the sound machine, by which effects are sized."""
+    """Set `s.span`: amplitudes of the sound machine, the scale of effect sizes."""
     us = [run[c] for c in ("u", "u1", "u2") if c in run]
     s.span["u_top"] = float(max(np.quantile(np.abs(u), 0.999) for u in us))
     for d, u in enumerate(us):
@@ -154,7 +154,7 @@ def measure_span(s: Setup, run: Run) -> None:
 
 
 def put(s: Setup, parts: tuple[draw.Part, ...], seed: list[int]) -> tuple[Setup, list[dict[str, Any]]]:
-    """A copy of the machine with these effects, and what the answers say of each."""
+    """Copy of the machine with these effects, and their entries in the answers."""
     s = copy.deepcopy(s)
     said = []
     for k, part in enumerate(parts):
@@ -207,7 +207,7 @@ def make(seed: int, i: int, which: tuple[str, ...]) -> tuple[Setup, Run, dict[st
 def conceal(
     p: draw.Plan, base: Setup, a: Run, floor: dict[str, float], sizes: list[int], noise: list[int], lowered: int
 ) -> Found | None:
-    """The plan's effects in a sound machine whose run is `a`, or None where the loop does not hold with them."""
+    """Case with the plan's effects in a sound machine with run `a`; None where the loop then fails."""
     if not p.parts:
         return math.inf, base, a, answer_of(p, base, [], a, floor, visibility(base, a, a, floor), lowered)
     s, said = put(base, p.parts, sizes)
@@ -238,7 +238,7 @@ def answer_of(
     p: draw.Plan, s: Setup, said: list[dict[str, Any]], run: Run, floor: dict[str, float],
     seen: dict[str, dict[str, float]], lowered: int,
 ) -> dict[str, Any]:  # fmt: skip
-    """One entry of answers.json, with the keys of the practice answers."""
+    """Entry of answers.json, with the keys of the practice answers."""
     rms = {c: float(np.sqrt(np.mean(run[c] ** 2))) for c in channels(s)}
     main = s.sensors[0]
     return {
@@ -257,7 +257,7 @@ def _round(value: float) -> float:
 
 
 def write_bundle(folder: Path, s: Setup, run: Run) -> None:
-    """recording.parquet and case.json; counts as 32-bit integers."""
+    """Write recording.parquet and case.json; counts as 32-bit integers."""
     import pyarrow as pa
 
     from rtctl.trace.bundle import save_case, write_parquet
@@ -292,10 +292,10 @@ def generate(
     folder: Path | str, count: int, seed: int, plants: tuple[str, ...] = PLANTS,
     progress: Progress | None = None, jobs: int = 1, heldout: bool = False,
 ) -> Path:  # fmt: skip
-    """Write `count` cases, their answers and the seal into `folder`, and return it. Goes on where it was stopped.
+    """Write `count` cases, their answers and the seal into `folder`, and return it. Continues an interrupted run.
 
-    `progress` is called with the cases done and `count`. Raises UserError for a folder that holds cases already, for no
-    cases and for a plant that is not ivu, ldu or axis.
+    `progress` is called with the number of finished cases and `count`. Raises UserError for a folder with cases, for
+    `count` 0 and for a plant other than ivu, ldu or axis.
     """
     bad = [p for p in plants if p not in PLANTS]
     if bad or not plants:

@@ -1,4 +1,4 @@
-"""The controllers' laws, tick by tick: the solver runs them, and `recompute` repeats them from a recording.
+"""Control laws, tick by tick: the solver runs them, and `recompute` repeats them from a recording.
 
 Kinds: 0 two reels, PD with an allocation over two motors; 1 sections in series on the position error; 2 cascade of a
 position and a speed gain (EMPS). Units: rad or m in, V out, clipped and rounded to the DAC step.
@@ -15,12 +15,12 @@ from rtctl.proof.compiled import compiled
 IVU, SECTIONS, CASCADE = 0.0, 1.0, 2.0
 PULL, DIFFERENTIAL, MOTOR1, MOTOR2 = 0.0, 1.0, 2.0, 3.0
 ALLOCATIONS = {"pull": PULL, "differential": DIFFERENTIAL, "motor1": MOTOR1, "motor2": MOTOR2}
-NL = 32  # state of a law
+NL = 32  # states of a law
 
 
 @compiled
 def dac(u, limit, top, step):
-    """Clip to +-limit, round to the step, and keep within what the converter has codes for."""
+    """Voltage clipped to +-limit, rounded to the step, and limited to the codes of the converter."""
     u = min(max(u, -limit), limit)
     if step <= 0.0:
         return u
@@ -29,7 +29,7 @@ def dac(u, limit, top, step):
 
 @compiled
 def law_tick(law, s, first, ref, w, reading, u):
-    """One tick: reading (counts, or m) and reference in, voltages out in `u` (2,). `s` (NL,) is the law's memory."""
+    """One tick: reading (counts, or m) and reference in, voltages out in `u` (2,). `s` (NL,) is the law's state."""
     kind = int(law.kind)
     if kind == 0:
         e = ref - law.counts_to_q * reading
@@ -82,14 +82,14 @@ def law_tick(law, s, first, ref, w, reading, u):
 
 @compiled
 def replay(law, ref, w, reading, u):
-    """The law over a whole recording; fills u (n, 2)."""
+    """Run the law over a whole recording; fills u (n, 2) in V."""
     s = np.zeros(NL)
     for k in range(len(ref)):
         law_tick(law, s, k == 0, ref[k], w[k], reading[k], u[k])
 
 
 def from_case(case: dict[str, Any]) -> np.ndarray:
-    """The law record that case.json describes."""
+    """Law record described by case.json."""
     c, d, sensors, p = case["controller"], case["drive"], case["sensors"], case["parameters"]
     Ts = 1.0 / case["sample_rate"]
     limit = d["limit_volt"]
@@ -113,13 +113,13 @@ def from_case(case: dict[str, Any]) -> np.ndarray:
 
 
 def reading_of(case: dict[str, Any], columns: dict[str, np.ndarray]) -> np.ndarray:
-    """The column that the law closes its loop on."""
+    """Feedback column (n,) of the law."""
     name = {"ivu": "capstan_counts", "ldu": "encoder_counts", "axis": "x"}[case["plant"]]
     return np.asarray(columns[name], float)
 
 
 def recompute(case: dict[str, Any], columns: dict[str, np.ndarray]) -> np.ndarray:
-    """Voltages (n, 2) that the law in case.json writes for what the recording holds; the second is 0 with one drive."""
+    """Voltages (n, 2) of the law in case.json for recorded columns, in V; the second is 0 with one drive."""
     u = np.zeros((len(columns["t"]), 2))
     replay(from_case(case)[()], columns["ref"], columns["w"], reading_of(case, columns), u)
     return u

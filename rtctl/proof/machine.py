@@ -4,8 +4,8 @@
     F_s = c_s e_s + k_s e_s' + ...
     e_s = l_i(q_i) + l_j(q_j),  l(q) = a q + grow q^2 / 2 + sum_n (ecc_n / n) (sin(n q + ph_n) - sin ph_n)
 
-All three plants are such machines. Every effect of the table, and every one that has no name there, is a number in
-this record that is 0 (or without limit) in a sound machine, so that one compiled solver serves all cases.
+All three plants have this form. Every effect, listed in the table or not, is a number in this record. The number is 0
+(or unlimited) in a sound machine: one compiled solver serves all cases.
 """
 
 from typing import Any
@@ -53,7 +53,7 @@ LAW = np.dtype([(n, "f8") for n in LAW_NUMBERS] + [("sections", "f8", (6, 5))])
 
 
 def blank() -> np.ndarray:
-    """A machine record () without effects: everything 0, limits far away."""
+    """Machine record () without effects: all fields 0, limits out of reach."""
     m = np.zeros((), MACHINE)
     for name, value in (
         ("q_delta", 1.0), ("q_v_s", 1.0), ("q_v_eps", 1.0), ("q_sigma0", 1.0), ("q_bump_w", 1.0), ("q_w_neg", 1.0),
@@ -67,13 +67,13 @@ def blank() -> np.ndarray:
 
 
 def node(m: np.ndarray, i: int, **values: float) -> None:
-    """Set fields of node `i`; all are SI numbers."""
+    """Set fields of node `i`, in SI."""
     for name, value in values.items():
         m[f"q_{name}"][i] = value
 
 
 def dry(m: np.ndarray, i: int, level: float, soft: float, law: float, v_eps: float) -> None:
-    """Plain dry friction of `level` (Nm or N): sticks within `soft` (rad or m), or is steep within `v_eps`."""
+    """Set dry friction of `level` (Nm or N): elastic within `soft` (rad or m), or steep within speed `v_eps`."""
     sigma0 = level / soft
     node(m, i, F_C=level, friction_law=law, sigma0=sigma0, v_eps=v_eps, sigma1=np.sqrt(sigma0 * float(m["q_J"][i])))
 

@@ -1,4 +1,4 @@
-"""Every name of the table, second half: ripples, transmission, structure, tape, geometry."""
+"""Effects of the table, second half: ripples, transmission, structure, tape, geometry."""
 
 import math
 
@@ -23,7 +23,7 @@ def _harmonics(rng: np.random.Generator, rich: float = 0.6) -> np.ndarray:
 
 
 def _misread(s: Setup, y: int, bank: int, a: np.ndarray, n: float, phase: np.ndarray) -> None:
-    """A wave and its harmonics (3,) in the reading of sensor y; a wheel's and a guide's have a bank of their own."""
+    """Add a periodic error with harmonics (3,) to the reading of sensor y; `bank` separates wheel and guide."""
     at = slice(bank, bank + machine.NH)
     s.m["rip_a"][y, at], s.m["rip_n"][y, at], s.m["rip_ph"][y, at] = a, n * np.arange(1, 4), phase
 
@@ -83,11 +83,11 @@ def capstan(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes
 @effect("guide.thickness", {"ldu": ("carriage",), "axis": ("sensor",)}, ("position",),
         {"ldu": ("carriage", "scale"), "axis": ("sensor", "carriage")}, rich=True)  # fmt: skip
 def thickness(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
-    """A strip or extrusion of uneven thickness: what the scale sees beside the capstan's way (11.6)."""
+    """Uneven thickness of a strip or extrusion: difference between scale and capstan travel (11.6)."""
     y, f = (1, s.truth["R_c"]) if s.plant == "ldu" else (0, 1.0)
     a = about(rng, 2e-5 if s.plant == "ldu" else 3e-4) * size
     span = float(np.ptp(s.ref))
-    wanted = span / rng.uniform(1.5, 5.0)  # it comes at least once, and is not as long as the capstan's turn of 19 mm
+    wanted = span / rng.uniform(1.5, 5.0)  # at least one period, and not the 19 mm of a capstan turn
     wave = min((0.003125, 0.00625, 0.0125, 0.025, 0.0375, 0.075, 0.15), key=lambda v: abs(math.log(v / wanted)))
     _misread(s, y, machine.NH, a / f * _harmonics(rng, 0.4), 2 * math.pi / wave * f, rng.uniform(0, 2 * math.pi, 3))
     return {"amplitude_m": a, "wavelength_m": wave}
@@ -108,8 +108,8 @@ def backlash(s: Setup, node: str, size: float, rng: np.random.Generator) -> Size
 @effect("transmission.slip", {"ivu": ("capstan",), "ldu": ("wheel",)}, ("tension", "velocity", "command", "time"),
         {"ivu": ("capstan", "tape1", "tape2"), "ldu": ("wheel", "motor")})  # fmt: skip
 def slip(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
-    """Sliding where the contact would carry more than its limit, which the hardest moves reach."""
-    share = 1.0 - (0.04 if s.plant == "ivu" else 0.35) * size * about(rng, 1.0)  # of the time that the contact holds
+    """Slip above the limit of the contact force, which the hardest moves reach."""
+    share = 1.0 - (0.04 if s.plant == "ivu" else 0.35) * size * about(rng, 1.0)  # share of time without slip
     a = float(np.quantile(s.acceleration, share))
     if s.plant == "ivu":
         limit = (s.truth["tau_Fc"] + s.truth["J_c"] * a) / s.truth["R_c"]
@@ -169,7 +169,7 @@ def stiffening(s: Setup, node: str, size: float, rng: np.random.Generator) -> Si
 @effect("tape.viscoelastic", TAPES, ("frequency", "tension", "time"),
         {"ivu:tape1": ("tape1", "reel1"), "ivu:tape2": ("tape2", "reel2")}, rich=True)  # fmt: skip
 def viscoelastic(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
-    """One Maxwell branch beside the spring and damper, or two a decade apart."""
+    """One Maxwell branch parallel to the spring and damper, or two with time constants a decade apart."""
     j = _spring_of(node)
     c, tau = about(rng, 700.0) * size, about(rng, 0.2, 0.7)
     s.m["br_c"][j, 0], s.m["br_tau"][j, 0] = c, tau
@@ -180,14 +180,14 @@ def viscoelastic(s: Setup, node: str, size: float, rng: np.random.Generator) -> 
 
 @effect("tape.slack", TAPES, ("tension",), {"ivu": ("tape1", "tape2")})
 def slack(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
-    """The tape pulls and cannot push; both sides are of one tape."""
+    """Slack: the tape carries no compression, on both sides."""
     s.m["s_pull_only"][[1, 2]] = 1.0
     return {}
 
 
 @effect("geometry.radius_change", REELS, ("position", "time", "angle"), {"ivu": ("reel1", "reel2")})
 def radius_change(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
-    """Paper that builds up on one reel and leaves the other (4.1-4.4)."""
+    """Radii that change with the tape wound from one reel to the other (4.1-4.4)."""
     d = about(rng, 3e-4) * size
     s.m["s_grow_i"][[1, 2]] = d / (2 * math.pi)
     s.m["s_rho_h"][[1, 2]] = s.truth["rho_tape"] * s.truth["h_tape"]

@@ -1,4 +1,4 @@
-"""References and excitations: what an owner would play while recording."""
+"""References and excitations of recordings."""
 
 import math
 
@@ -8,7 +8,7 @@ import numpy as np
 def rich(
     rng: np.random.Generator, n: int, Ts: float, step: float, slow: float, fast: float, reach: float
 ) -> np.ndarray:
-    """Moves, ramps, waves and dwells in turn; `step` is a typical move, speeds run from `slow` to `fast` (unit/s).
+    """Reference (n,) of moves, ramps, waves and dwells; `step` is a typical move, speed `slow` to `fast` (unit/s).
 
     Stays within +-reach. Starts at 0 with a dwell.
     """
@@ -40,7 +40,7 @@ def rich(
 
 
 def production(rng: np.random.Generator, n: int, Ts: float, step: float, fast: float, reach: float) -> np.ndarray:
-    """Trapezoidal moves with dwells, as a machine at work makes them."""
+    """Reference (n,) of trapezoidal moves with dwells, as in production."""
     parts = [np.zeros(int(0.5 / Ts))]
     at = 0.0
     while sum(map(len, parts)) < n:
@@ -56,13 +56,13 @@ def production(rng: np.random.Generator, n: int, Ts: float, step: float, fast: f
 
 
 def _blend(length: float, Ts: float) -> np.ndarray:
-    """0 to 1 without a jump of acceleration (quintic)."""
+    """Profile from 0 to 1 with continuous acceleration (quintic)."""
     r = np.linspace(0.0, 1.0, max(int(max(length, 0.12) / Ts), 2))
     return r**3 * (10.0 - 15.0 * r + 6.0 * r * r)
 
 
 def _trapezoid(length: float, Ts: float) -> np.ndarray:
-    """0 to 1 at constant speed with quick rounded ends."""
+    """Profile from 0 to 1 at constant speed with short rounded ends."""
     n = max(int(length / Ts), 8)
     ends = max(int(0.15 * n), 2)
     speed = np.interp(np.arange(n), [0, ends, n - 1 - ends, n - 1], [0.0, 1.0, 1.0, 0.0])
@@ -70,7 +70,7 @@ def _trapezoid(length: float, Ts: float) -> np.ndarray:
 
 
 def multisine(rng: np.random.Generator, n: int, Ts: float, rms: float, top_hz: float, slope: float) -> np.ndarray:
-    """Random-phase noise up to `top_hz`, its amplitude falling with f^-slope above a twentieth of that."""
+    """Random-phase multisine (n,) up to `top_hz`; its amplitude falls with f^-slope above `top_hz` / 20."""
     f = np.fft.rfftfreq(n, Ts)
     knee = top_hz / 20.0
     size = np.where((f > 0.3) & (f < top_hz), np.maximum(f / knee, 1.0) ** -slope, 0.0)

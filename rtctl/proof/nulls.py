@@ -1,8 +1,8 @@
-"""Calibration of a diagnosis on machines that lack nothing: the evidence against the description alone.
+"""Calibration of a diagnosis on machines without missing physics, by the Bayes factor against the nominal model.
 
-A Bayes factor B for "something is missing" has the mean 1 over recordings of machines that lack nothing, so that 1/B is
-at most u in a share u of them. 1/B is therefore a p-value that may be too large, and must not be too small: a
-Kolmogorov-Smirnov test on one side compares it with the uniform distribution.
+A Bayes factor B for "something is missing" has the mean 1 over recordings of machines without missing physics.
+Therefore 1/B is at most u in at most a share u of the recordings: it is a conservative p-value. A one-sided
+Kolmogorov-Smirnov test compares 1/B with the uniform distribution.
 
 Source: Kass & Raftery, Bayes factors, JASA 90 (1995); Shafer et al., Test martingales, Bayes factors and p-values,
 Statistical Science 26 (2011).
@@ -12,12 +12,12 @@ from collections import defaultdict
 from typing import Any
 
 Json = dict[str, Any]
-SOUND = ("null", "parameters")  # kinds of cases
-LEAST = 1e-4  # a probability that is smaller is not in diagnosis.json
+SOUND = ("null", "parameters")  # kinds of cases without missing physics
+LEAST = 1e-4  # smaller probabilities are not in diagnosis.json
 
 
 def p_value(d: Json | None) -> float | None:
-    """1/B (0 to 1) of a diagnosis, with one effect as probable as none beforehand; None where there is no answer."""
+    """p-value 1/B (0 to 1) of a diagnosis, for equal priors of an effect and none; None without an answer."""
     if not d or "probabilities" not in d:
         return None
     nothing = sum(float(entry["probability"]) for entry in d["probabilities"] if not entry["effects"])
@@ -26,8 +26,10 @@ def p_value(d: Json | None) -> float | None:
 
 
 def nulls(cases: Json, diagnoses: dict[str, Json | None]) -> Json:
-    """Cases that lack nothing: how many, the largest excess of the share of p-values up to u over u, the p-value of
-    that excess, and the same by kind of machine. None stands where there is no case."""
+    """One-sided Kolmogorov-Smirnov test of cases without missing physics, for all and by kind of machine.
+
+    Number of cases, largest excess of the share of p-values up to u over u, and its p-value; None without cases.
+    """
     found: dict[str, list[float]] = defaultdict(list)
     for name, answer in cases.items():
         p = p_value(diagnoses.get(name))

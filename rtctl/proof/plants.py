@@ -1,4 +1,4 @@
-"""The three plants with what their owners believe, and true values a few percent off.
+"""The three plants with nominal values, and true values that differ by a few percent.
 
 Source: thesis 4.9-4.17 and appendix A (two reels), F.1-F.9 (linear drive); Janot, Gautier & Brunot 2019 (axis).
 """
@@ -15,17 +15,17 @@ IVU_NODES = {"motor1": 0, "reel1": 1, "reel2": 2, "motor2": 3, "capstan": 4}
 LDU_NODES = {"motor": 0, "wheel": 1, "capstan": 2, "carriage": 2, "encoder": 3}
 EXACT = ("R_c", "R_min", "rho_tape", "h_tape", "J_10", "J_20", "N", "R_s", "R_t")
 RADII = ("R1", "R2")
-SUBSTEPS = {"ivu": 50, "ldu": 12, "axis": 20}  # a tick: 40 us, 8.3 us, 50 us
-GIVES = 0.02  # of the finest count: how far dry friction of a sound machine gives before it slides; more is presliding
+SUBSTEPS = {"ivu": 50, "ldu": 12, "axis": 20}  # solver steps per tick: 40 us, 8.3 us, 50 us
+GIVES = 0.02  # share of the finest count: elastic travel of dry friction in a sound machine; more is presliding
 
 
 def reel_inertia(p: dict[str, float], R: float, core: float) -> float:
-    """Core and paper (4.1)."""
+    """Inertia of a reel in kg m^2, core and paper (4.1)."""
     return core + 0.5 * math.pi * p["rho_tape"] * p["h_tape"] * (R**4 - p["R_min"] ** 4)
 
 
 def true_values(rng: np.random.Generator, believed: dict[str, float], tolerance: float, edge: bool) -> dict[str, float]:
-    """Each value within `tolerance`; at its edge (0.6 to 1 of it) where `edge`."""
+    """True values within `tolerance` of the nominal values; at 0.6 to 1 of the tolerance where `edge`."""
     out = {}
     for name, value in believed.items():
         r = rng.uniform(-0.85, 0.85) * tolerance
@@ -40,13 +40,13 @@ def true_values(rng: np.random.Generator, believed: dict[str, float], tolerance:
 
 
 def friction_law(rng: np.random.Generator) -> float:
-    """Of a sound machine: the elastic stop. The steep law creeps while it should stick, which is missing physics."""
-    rng.random()  # the stream stays as it was when there was a choice
+    """Friction law of a sound machine: the elastic stop. The steep law creeps during sticking: missing physics."""
+    rng.random()  # keeps the random stream of earlier versions, which drew a law
     return machine.STOP
 
 
 class Play(NamedTuple):
-    """How an owner records this machine; called with a generator, it gives reference and excitation (n,)."""
+    """Motion of a recording: called with a generator, it returns reference and excitation (n,)."""
 
     how: str  # rich or production
     n: int
@@ -55,7 +55,7 @@ class Play(NamedTuple):
     slow: float
     fast: float
     reach: float
-    rms: float  # V, of the excitation
+    rms: float  # V, rms of the excitation
     top_hz: float
     slope: float
 
@@ -218,7 +218,7 @@ def _case(plant: str, rate: float, p: dict[str, float], delay: float, reaches: d
 
 
 def _with_law(rng: np.random.Generator, s: Setup, other: bool) -> Setup:
-    """The law of the case; or, where the owner does not know it, the same with an integrator that nobody mentions."""
+    """Setup with the law of the case; where the law is undocumented, with an additional integrator."""
     from rtctl.proof.law import from_case
 
     s.m["y_phase"] = rng.uniform(0.05, 0.95, 3)

@@ -1,4 +1,4 @@
-"""The whole proof: generate and seal, diagnose every case, open the seal, score, report. Goes on where it stopped."""
+"""Complete proof: generate and seal, diagnose, open the seal, score, report. Continues an interrupted run."""
 
 import json
 import os
@@ -12,7 +12,7 @@ from rtctl.proof import report, seal
 from rtctl.proof.batch import MACHINES_MIX, MIX
 
 SCORES, REPORT, RESULT = "scores.json", "report.md", "diagnosis.json"
-FAILED = "failed.json"  # beside a case: what went wrong, so that it is not tried again
+FAILED = "failed.json"  # file beside a case with its failure; the case is not tried again
 
 Progress = Callable[[int, int], None]
 
@@ -27,7 +27,7 @@ def prepare(
     progress: Progress | None,
     machines: bool = False,
 ) -> str:
-    """Generate and seal, unless the folder holds just these cases; returns the hash of the answers.
+    """Generate and seal the cases unless the folder holds exactly these; returns the hash of the answers.
 
     With `machines` the cases are of described machines, and `plants` are topologies. Raises UserError where the folder
     holds other cases or its answers are not the sealed ones.
@@ -60,8 +60,10 @@ def cases(folder: Path) -> list[Path]:
 def diagnose_all(
     folder: Path | str, jobs: int = 1, progress: Progress | None = None, work: Any = None, limit: float | None = None
 ) -> None:
-    """Diagnose every case that has neither a diagnosis nor a failure on record, none for longer than `limit` s, or
-    than a folder's usual one; `work` stands in for it in tests."""
+    """Diagnose every case without a recorded diagnosis or failure.
+
+    A case may take `limit` s, by default the usual limit of a folder. `work` replaces the diagnosis in tests.
+    """
     from rtctl.diagnose import folder as many
 
     every = cases(Path(folder))
@@ -72,7 +74,7 @@ def diagnose_all(
     for outcome in many.diagnose_all(tasks, jobs, longest, report=False, work=work or many.one):
         out = Path(folder) / outcome.name / "diagnosis"
         out.mkdir(exist_ok=True)
-        if outcome.code:  # a failure of the tool is written down, not raised
+        if outcome.code:  # a failure of the tool is recorded, not raised
             write_text(out / FAILED, json.dumps({"error": outcome.message}) + "\n")
         write_text(out / "seconds.json", json.dumps(outcome.seconds) + "\n")
         done += 1
@@ -81,8 +83,7 @@ def diagnose_all(
 
 
 def score_all(folder: Path | str) -> dict[str, Any]:
-    """Open the seal, score, and write scores.json, report.md and its two pictures. Raises UserError where the seal is
-    broken."""
+    """Open the seal, score, and write scores.json, report.md and two figures. Raises UserError for a broken seal."""
     from rtctl.proof import figures
     from rtctl.proof.score import score
 
@@ -103,7 +104,7 @@ def score_all(folder: Path | str) -> dict[str, Any]:
 
 
 def diagnoses_of(folder: Path) -> dict[str, Any]:
-    """What diagnosis.json says of each case; None where there is none."""
+    """Content of diagnosis.json by case; None where it is missing."""
     return {bundle.name: _json(bundle / "diagnosis" / RESULT) for bundle in cases(folder)}
 
 
@@ -115,7 +116,7 @@ def _json(path: Path) -> Any:
 
 
 def words(result: dict[str, Any]) -> str:
-    """The main table for a terminal."""
+    """Main table of scores for a terminal."""
     rows = [[report._cell(x) for x in row] for row in report.summary(result)]
     width = max(len(row[0]) for row in rows)
     return "\n".join(f"{what:{width}}  {figure:>8}  {of:>5}" for what, figure, of in rows)

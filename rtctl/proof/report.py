@@ -1,4 +1,4 @@
-"""Scores as Markdown: the table of figures, failures, the confusion matrix, reliability, the smallest size found."""
+"""Markdown report of scores: main table, failures, confusion matrix, reliability, smallest size found."""
 
 from typing import Any
 
@@ -17,7 +17,7 @@ def _cell(x: Any) -> str:
 
 
 def summary(R: Json) -> list[list[Any]]:
-    """Rows (what, figure, of how many) of the main table."""
+    """Rows (quantity, value, number of cases) of the main table."""
     single, null, unknown = R["single"], R["null"], R["unknown"]
     rows: list[list[Any]] = [["single effects: right name", single["top1"], single["cases"]]]
     rows += [[f"- at size {s}", x["top1"], x["cases"]] for s, x in single["by_size"].items()]
@@ -51,7 +51,7 @@ def summary(R: Json) -> list[list[Any]]:
 
 
 def by_plant(R: Json) -> list[list[Any]]:
-    """One row for every plant or topology; shares with the number of cases they are of."""
+    """Rows of the table by plant or topology: shares with numbers of cases."""
     return [
         [name, x["cases"], f"{_cell(x['single'])} ({x['singles']})", f"{_cell(x['typical'])} ({x['typicals']})",
          x["node"], f"{x['false_alarms']} of {x['nulls']}", f"{x['false_names']} of {x['unknowns']}",
@@ -61,7 +61,7 @@ def by_plant(R: Json) -> list[list[Any]]:
 
 
 def confusion(R: Json) -> str:
-    """Truth by answer, as a list: most cells of the matrix are empty."""
+    """Confusion matrix as a list of its non-empty cells."""
     rows = []
     for truth, columns in R["confusion"].items():
         ordered = sorted(columns.items(), key=lambda x: -x[1])
@@ -70,7 +70,7 @@ def confusion(R: Json) -> str:
 
 
 def markdown(R: Json, title: str = "Concealed cases") -> str:
-    """The whole report."""
+    """Complete report as Markdown."""
     parts = [f"## {title}", table(["what", "figure", "of"], summary(R))]
     if R.get("by_plant"):
         parts += ["### By machine", table(["machine", "cases", "right name", "at typical size", "right node",

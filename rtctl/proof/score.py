@@ -1,7 +1,7 @@
 """Scores of diagnoses against the opened answers: names, nodes, axes, false alarms, intervals, calibration, time.
 
-Kinds `null`, `parameters` and `decoy` hold nothing that is missing. A single effect counts 1 when it is named first and
-0.5 when it is among at most three of an `ambiguous` verdict; below `visible` times the noise floor it counts apart.
+Kinds `null`, `parameters` and `decoy` have no missing physics. A single effect scores 1 where it is named first, and
+0.5 among at most three names of an `ambiguous` verdict. Effects below `visible` times the noise floor count separately.
 """
 
 import math
@@ -14,7 +14,7 @@ from rtctl.proof.nulls import nulls
 NOTHING_MISSING = ("null", "parameters", "decoy")
 VERDICTS = ("named", "ambiguous", "unnamed", "nothing")
 BINS = 10
-CALLED = {  # a size of the answers -> what a diagnosis calls it
+CALLED = {  # size in the answers -> name in a diagnosis
     "offset_V": ("offset",), "band_V": ("band",), "limit_V": ("limit",), "tau_s": ("tau",), "asymmetry": ("a",),
     "travel": ("z_s",), "amplitude_m": ("A",), "amplitude_rad": ("A",), "amplitude_Nm": ("A",), "amplitude_N": ("A",),
     "wavelength_m": ("wavelength", "turn"), "at_m": ("at",), "force_N": ("F",), "width_m": ("width",),
@@ -40,7 +40,7 @@ def mean(values: Iterable[float | None]) -> float | None:
 
 
 def given(d: Json | None) -> list[Json]:
-    """The effects of a diagnosis, best first, at most three."""
+    """Effects of a diagnosis, best first, at most three."""
     return [e for e in (d or {}).get("effects") or [] if isinstance(e, dict) and isinstance(e.get("name"), str)][:3]
 
 
@@ -51,7 +51,7 @@ def confidence(e: Json) -> float:
 
 
 def admits(d: Json | None, effect: Json) -> bool:
-    """Whether the diagnosis says that it cannot test this effect."""
+    """Whether the diagnosis reports this effect as untestable."""
     for said in (d or {}).get("cannot_test") or []:
         name, _, node = str(said.get("name", "") if isinstance(said, dict) else said).partition(":")
         if name == effect["name"] and (not node or node in effect["nodes_ok"]):
@@ -60,12 +60,12 @@ def admits(d: Json | None, effect: Json) -> bool:
 
 
 def same(effect: Json, name: Any) -> bool:
-    """Whether `name` is the true one or an exact twin of it on this machine (`names_ok` of the answer)."""
+    """Whether `name` is the true name or equivalent to it on this machine (`names_ok` of the answer)."""
     return bool(name == effect["name"] or name in effect.get("names_ok", ()))
 
 
 def canonical(a: Json, names: list[str]) -> list[str]:
-    """Answered names, exact twins of a true effect read as that effect, each effect once."""
+    """Answered names, each once, with equivalents of a true effect replaced by the true name."""
     out: list[str] = []
     for name in names:
         true = [e["name"] for e in a["effects"]]
@@ -89,7 +89,7 @@ def column_of(a: Json, verdict: str, names: list[str]) -> str:
 
 
 def gap_closed(d: Json | None) -> float | None:
-    """Share of the held-out error above the floor that the named effects took away, -1 to 1."""
+    """Share of the held-out error above the floor explained by the named effects, -1 to 1."""
     fit = (d or {}).get("fit") or {}
     try:
         before, after, floor = (float(fit[k]) for k in ("heldout_nrmse_before", "heldout_nrmse_after", "noise_floor"))
@@ -101,7 +101,7 @@ def gap_closed(d: Json | None) -> float | None:
 
 
 def coverage(pairs: list[tuple[Any, float]]) -> tuple[int, int]:
-    """How many of the 90 % intervals (ci90, true value) hold the truth, and of how many."""
+    """Number of 90 % intervals in `pairs` (ci90, true value) that contain the truth, and number of intervals."""
     held = total = 0
     for ci, true in pairs:
         if isinstance(ci, list | tuple) and len(ci) == 2 and all(isinstance(x, int | float) for x in ci):
@@ -111,7 +111,7 @@ def coverage(pairs: list[tuple[Any, float]]) -> tuple[int, int]:
 
 
 def reliability(scored: list[tuple[float, float]]) -> Json:
-    """Brier score, expected calibration error and the table behind it, from (confidence, right or not)."""
+    """Brier score, expected calibration error and its table, from pairs (confidence, right or not)."""
     table, ece = [], 0.0
     for b in range(BINS):
         inside = [(c, y) for c, y in scored if b / BINS <= c < (b + 1) / BINS or (b == BINS - 1 and c == 1.0)]
@@ -126,7 +126,7 @@ def reliability(scored: list[tuple[float, float]]) -> Json:
 
 
 def score(answers: Json, diagnoses: dict[str, Json | None], visible: float = 0.3, seconds: Json | None = None) -> Json:
-    """All scores. `answers` is the opened file or its "cases"; `diagnoses` maps a case to its diagnosis.json.
+    """Scores of all cases. `answers` is the opened file or its "cases"; `diagnoses` maps a case to its diagnosis.json.
 
     A case without a valid diagnosis counts as missing, and as a failure. `seconds` maps a case to its time.
     """
@@ -200,7 +200,7 @@ def score(answers: Json, diagnoses: dict[str, Json | None], visible: float = 0.3
 
 
 def _brief(cases: Json, diagnoses: dict[str, Json | None]) -> Json:
-    """Scores of the cases of one plant or topology: shares, and of how many."""
+    """Scores of one plant or topology: shares with numbers of cases."""
     R = score(cases, diagnoses)
     typical = R["single"]["by_size"].get("1.0", {"cases": 0, "top1": None})
     return {
@@ -213,7 +213,7 @@ def _brief(cases: Json, diagnoses: dict[str, Json | None]) -> Json:
 
 
 def _single(S: Any, a: Json, d: Json | None, verdict: str, names: list[str], visible: float) -> float | None:
-    """Points of a single, or None where nobody could see it; fills nodes, axes and the invisible."""
+    """Points of a single effect, None where it is invisible; fills nodes, axes and invisible cases in S."""
     effect = a["effects"][0]
     if a["ratio"] < visible:
         right = verdict == "named" and names[:1] == [effect["name"]]
@@ -241,7 +241,7 @@ def _base_intervals(a: Json, d: Json | None) -> list[tuple[Any, float]]:
 
 
 def _effect_intervals(a: Json, effects: list[Json]) -> list[tuple[Any, float]]:
-    """Intervals of sizes that the answers know, for names that are right and where they stand."""
+    """Pairs (ci90, true size) of effects with the right name and node."""
     out = []
     for e in effects:
         said = e.get("parameters") or {}
@@ -254,7 +254,7 @@ def _effect_intervals(a: Json, effects: list[Json]) -> list[tuple[Any, float]]:
 
 
 def _smallest(found: list[tuple[float, bool]]) -> Json:
-    """Smallest ratio to the floor at which the name was right, and how many were looked for."""
+    """Smallest ratio to the floor with a right name, number named and number of cases."""
     hits = [ratio for ratio, right in found if right]
     return {"ratio": round(min(hits), 3) if hits else None, "found": len(hits), "of": len(found)}
 
@@ -306,5 +306,5 @@ def _result(cases: Json, S: Any, by_size: dict[str, list[float]], by_name: dict[
             "extra_names_per_case": mean(float(e) for _, _, e in x),
         }  # fmt: skip
     if S["calibration_named"]:
-        result["brier"] = reliability(S["calibration_named"])["brier"]  # of the cases that hold a name
+        result["brier"] = reliability(S["calibration_named"])["brier"]  # of the cases with effects of the table
     return result

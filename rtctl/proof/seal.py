@@ -1,4 +1,4 @@
-"""The seal: a hash of the answers, written before the tool runs, that anyone can check afterwards."""
+"""Seal: hash of the answers, written before the diagnosis and verifiable afterwards."""
 
 import hashlib
 import json
@@ -13,7 +13,7 @@ ANSWERS, SEAL = "answers.json", "seal.json"
 
 
 def canonical(answers: dict[str, Any]) -> str:
-    """The answers as one text that does not depend on the order of keys or on spaces."""
+    """Canonical text of the answers, independent of key order and spaces."""
     return json.dumps(answers, sort_keys=True, separators=(",", ":"), allow_nan=False)
 
 
@@ -22,7 +22,7 @@ def digest(answers: dict[str, Any], salt: str) -> str:
 
 
 def close_seal(folder: Path | str, answers: dict[str, Any]) -> str:
-    """Write answers.json and seal.json; returns the hash, to be shown before the tool runs."""
+    """Write answers.json and seal.json; returns the hash, to be published before the diagnosis."""
     folder = Path(folder)
     salt = secrets.token_hex(16)
     sha = digest(answers, salt)
@@ -33,7 +33,7 @@ def close_seal(folder: Path | str, answers: dict[str, Any]) -> str:
 
 
 def open_seal(folder: Path | str) -> dict[str, Any]:
-    """The answers, after their hash was checked. Raises UserError where they are not the ones that were sealed."""
+    """Answers with a verified hash. Raises UserError where the answers are not the sealed ones."""
     folder = Path(folder)
     seal, answers = _read(folder / SEAL), _read(folder / ANSWERS)
     for key in ("sha256", "salt"):

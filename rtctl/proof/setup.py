@@ -1,4 +1,4 @@
-"""One case before it is simulated: the true machine, what its owner believes, its law, reference and noise."""
+"""Setup of one case for the simulation: true machine, nominal values, law, reference and noise."""
 
 import math
 from dataclasses import dataclass, field
@@ -11,20 +11,20 @@ from rtctl.proof.machine import NQ, NY
 
 @dataclass
 class Hidden:
-    """What acts over time beside the machine record; amplitudes, so that noise seeds and effects stay independent."""
+    """Amplitudes of disturbances over time; the noise seed is independent of them."""
 
-    torque_sd: np.ndarray = field(default_factory=lambda: np.zeros(NQ))  # white, Nm or N, held for a tick
+    torque_sd: np.ndarray = field(default_factory=lambda: np.zeros(NQ))  # white noise, Nm or N, held for a tick
     colour: float = 0.0  # pole of the torque noise, 0 is white
-    random_sd: np.ndarray = field(default_factory=lambda: np.zeros(NQ))  # unknown random torque
+    random_sd: np.ndarray = field(default_factory=lambda: np.zeros(NQ))  # unknown random torque, Nm or N
     random_tau: float = 0.05  # s
-    count_sd: np.ndarray = field(default_factory=lambda: np.zeros(NY))  # sensor noise in counts
+    count_sd: np.ndarray = field(default_factory=lambda: np.zeros(NY))  # standard deviation of sensor noise, counts
     walk: np.ndarray = field(default_factory=lambda: np.zeros(NY))  # random walk of a reading, counts per root s
     lost_rate: np.ndarray = field(default_factory=lambda: np.zeros(NY))  # 1/s
     lost_counts: np.ndarray = field(default_factory=lambda: np.zeros(NY))
-    jitter_s: float = 0.0  # standard deviation of the tick's time
+    jitter_s: float = 0.0  # standard deviation of the tick times, s
     jitter_skew: float = 0.0  # 0 Gaussian, 1 late ticks only (exponential)
     clock_tells: bool = False  # column t holds the true times
-    spot_rate: float = 0.0  # 1/s, of friction that comes and goes
+    spot_rate: float = 0.0  # 1/s, rate of intermittent friction
     spot_s: float = 0.2
 
 
@@ -39,9 +39,9 @@ class Setup:
     nodes: dict[str, int]
     sensors: list[str]
     hidden: Hidden = field(default_factory=Hidden)
-    law: np.ndarray | None = None  # where the machine is not driven by the law of its case
-    play: Any = None  # plants.Play: another reference and excitation of the same kind
-    acceleration: np.ndarray = field(default_factory=lambda: np.zeros(1))  # sizes met by the sensor's node, rad/s^2
+    law: np.ndarray | None = None  # set where the true law is not the law of the case
+    play: Any = None  # plants.Play: draws another reference and excitation of this kind
+    acceleration: np.ndarray = field(default_factory=lambda: np.zeros(1))  # at the sensor's node, rad/s^2
     span: dict[str, float] = field(default_factory=dict)  # typical amplitudes: u (V), v, q at the main node
 
     @property
@@ -54,7 +54,7 @@ class Setup:
 
 
 def draws(setup: Setup, seed: list[int]) -> dict[str, np.ndarray]:
-    """The arrays that the solver takes, from one noise seed: each kind of noise has its own stream."""
+    """Noise arrays for the solver from one seed; each kind of noise has its own random stream."""
     h, n, Ts = setup.hidden, setup.n, setup.Ts
     stream = [np.random.default_rng([*seed, i]) for i in range(7)]
     push = stream[0].standard_normal((n, NQ))

@@ -1,7 +1,7 @@
-"""The closed loop with the true machine: Runge-Kutta of the fourth order between ticks, drives solved exactly.
+"""Simulation of the closed loop with the true machine: Runge-Kutta of fourth order, drives solved exactly.
 
-Row k of the output holds what the sensors said at tick k and what the law wrote. The write acts `delay` sample times
-after the tick, wherever between two ticks that falls; ticks come at the times they are given.
+Row k of the output holds the sensor readings at tick k and the written voltages. A voltage acts `delay` sample times
+after its tick, also between ticks. Ticks occur at the given times.
 """
 
 import numpy as np
@@ -11,12 +11,12 @@ from rtctl.proof.forces import NX, QV, dry_friction, rate, spring_force
 from rtctl.proof.law import NL, law_tick
 from rtctl.proof.machine import ENDLESS, NH, NQ, NS, NU, NY
 
-RUNAWAY = 1e7  # of any state: the loop is unstable
+RUNAWAY = 1e7  # any state above this value: the loop is unstable
 
 
 @compiled
 def wanted(m, d, u, total):
-    """Current in A that drive `d` aims at for `u` V, with `total` A drawn by all drives."""
+    """Setpoint of the current of drive `d` in A for `u` V, with `total` A drawn by all drives."""
     u = u + m.d_offset[d]
     band = m.d_band[d]
     if band > 0.0:
@@ -32,7 +32,7 @@ def wanted(m, d, u, total):
 
 @compiled
 def second_order(w, z, h, T):
-    """Fill T (2, 2): exact transition over h of (x, x' / w) of x'' + 2 z w x' + w^2 x = 0, z < 1."""
+    """Exact transition T (2, 2), filled in place, over h of (x, x' / w) of x'' + 2 z w x' + w^2 x = 0, z < 1."""
     wd = w * np.sqrt(1.0 - z * z)
     e = np.exp(-z * w * h)
     c, s = np.cos(wd * h), np.sin(wd * h)
@@ -144,7 +144,7 @@ def run(m, law, start, ref, w, ticks, push, spot, extra, lost, y, u):
 
 @compiled
 def _reading(m, s, x, offset):
-    """Sensor `s` in counts before they are whole."""
+    """Reading of sensor `s` in counts, before rounding."""
     q = x[int(m.y_node[s])]
     ripple = 0.0
     for n in range(2 * NH):
@@ -155,7 +155,7 @@ def _reading(m, s, x, offset):
 
 @compiled
 def _current(m, d, goal, lag, I1, Id, T, h):
-    """Advance the current of drive `d` by h; returns it."""
+    """Current of drive `d` in A after a step h."""
     aim = goal[d]
     if m.d_lag[d] > 0.0:
         lag[d] = aim + (lag[d] - aim) * np.exp(-h / m.d_lag[d])
@@ -168,7 +168,7 @@ def _current(m, d, goal, lag, I1, Id, T, h):
 
 @compiled
 def _remember(m, x, q0, z, xs, F, det, ring, ring_d, last, heat, spot, h):
-    """What has a memory beyond the differential equations: bristles, slipped springs, detents, ringing."""
+    """Update the states outside the differential equations: bristles, slipped springs, detents, ringing."""
     for i in range(int(m.nq)):
         load = 0.0
         if m.q_mu_load[i] != 0.0:

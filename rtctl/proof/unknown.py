@@ -1,4 +1,4 @@
-"""Physics that no table has a name for: a tool that names it is wrong, whatever it says."""
+"""Unknown physics: effects without a name in the table. Any name in an answer is wrong."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -25,7 +25,7 @@ def unknown(name: str, nodes: Mapping[str, tuple[str, ...]]) -> Callable[[Maker]
 
 @unknown("loose_mass", MAIN)
 def loose_mass(s: Setup, node: str, size: float, rng: np.random.Generator) -> None:
-    """A mass that rattles between two stops."""
+    """Loose mass between two stops."""
     i = index(s, node)
     J = about(rng, 0.4) * size * float(s.m["q_J"][i])
     w = 2 * math.pi * about(rng, {"ivu": 25.0, "ldu": 55.0, "axis": 30.0}[s.plant])
@@ -42,7 +42,7 @@ def random_torque(s: Setup, node: str, size: float, rng: np.random.Generator) ->
 
 @unknown("crosstalk", SENSE)
 def crosstalk(s: Setup, node: str, size: float, rng: np.random.Generator) -> None:
-    """The drive's voltage leaks into the reading."""
+    """Crosstalk of the drive's voltage into the reading."""
     s.m["y_cross"][0] = sign(rng) * about(rng, {"ivu": 20.0, "ldu": 5.0, "axis": 10.0}[s.plant]) * size
 
 
@@ -53,14 +53,14 @@ def air_drag(s: Setup, node: str, size: float, rng: np.random.Generator) -> None
 
 @unknown("detent", MAIN)
 def detent(s: Setup, node: str, size: float, rng: np.random.Generator) -> None:
-    """Magnetic detents that follow the rotor for part of a pitch: the torque depends on where it came from."""
+    """Magnetic detents with hysteresis: they follow the rotor for part of a pitch."""
     n = about(rng, 9.0) if s.plant == "ivu" else 2 * math.pi / about(rng, 0.15 * s.span["q"])
     machine.node(s.m, index(s, node), det_a=about(rng, 0.8 * level(s, node)) * size, det_n=n, det_play=0.7 / n)
 
 
 @unknown("friction_spots", MAIN)
 def spots(s: Setup, node: str, size: float, rng: np.random.Generator) -> None:
-    """Friction that comes and goes at random times."""
+    """Intermittent friction at random times."""
     i = index(s, node)
     s.m["q_spot_F"][i] = about(rng, 1.2 * level(s, node)) * size
     s.hidden.spot_rate, s.hidden.spot_s = about(rng, 12.0 / (s.n * s.Ts)), about(rng, 0.25)
@@ -68,7 +68,7 @@ def spots(s: Setup, node: str, size: float, rng: np.random.Generator) -> None:
 
 @unknown("parametric_stiffness", {"ivu": ("motor1", "motor2"), "ldu": ("capstan",)})
 def parametric(s: Setup, node: str, size: float, rng: np.random.Generator) -> None:
-    """A shaft as stiff as its angle lets it be."""
+    """Shaft stiffness that depends on its angle."""
     j = {"motor1": 0, "motor2": 3, "capstan": 1}[node]
     s.m["s_par_a"][j], s.m["s_par_n"][j] = 0.85 * min(size, 1.0), 3.0
     s.m["s_c"][j] *= {"ivu": 0.08, "ldu": 0.6}[s.plant] / size
@@ -76,14 +76,14 @@ def parametric(s: Setup, node: str, size: float, rng: np.random.Generator) -> No
 
 @unknown("negative_damping", MAIN)
 def negative_damping(s: Setup, node: str, size: float, rng: np.random.Generator) -> None:
-    """A band of speeds in which something drives along."""
+    """Negative damping in a band of speeds."""
     v = about(rng, 0.3 * s.span["v"])
     machine.node(s.m, index(s, node), F_neg=about(rng, 0.7 * level(s, node)) * size, v_neg=v, w_neg=0.25 * v)
 
 
 @unknown("supply_pulse", {"ivu": ("drive1", "drive2"), "ldu": ("drive",), "axis": ("drive",)})
 def supply_pulse(s: Setup, node: str, size: float, rng: np.random.Generator) -> None:
-    """Gain that pulsates with the mains."""
+    """Gain modulated at mains frequency."""
     d = 1 if node.endswith("2") else 0
     hz = {"ivu": about(rng, 4.0, 0.8), "ldu": about(rng, 15.0, 0.8), "axis": about(rng, 6.0, 0.8)}[s.plant]
     machine.drive(s.m, d, pulse_a=about(rng, 0.5) * size, pulse_f=hz)
@@ -91,7 +91,7 @@ def supply_pulse(s: Setup, node: str, size: float, rng: np.random.Generator) -> 
 
 @unknown("gyroscopic", {"ivu": ("reel2", "capstan")})
 def gyroscopic(s: Setup, node: str, size: float, rng: np.random.Generator) -> None:
-    """A torque that grows with the product of two speeds."""
+    """Torque proportional to the product of two speeds."""
     s.m["q_gyro"][index(s, node)] = sign(rng) * about(rng, 2.5e-3 / (0.4 * s.span["v"]) ** 2) * size
 
 
@@ -102,7 +102,7 @@ def sensor_walk(s: Setup, node: str, size: float, rng: np.random.Generator) -> N
 
 @unknown("ringing", MAIN)
 def ringing(s: Setup, node: str, size: float, rng: np.random.Generator) -> None:
-    """A note that sounds after each reversal."""
+    """Decaying oscillation after each reversal."""
     w = 2 * math.pi * about(rng, {"ivu": 7.0, "ldu": 35.0, "axis": 12.0}[s.plant])
     v = 0.02 * s.span["v"]
     machine.node(s.m, index(s, node), ring_a=about(rng, 2.0 * level(s, node)) * size, ring_w=w, ring_z=0.02, ring_v=v)

@@ -1,4 +1,4 @@
-"""Chapter 9, accuracy of the reel unit at every pair of radii: the law as printed, the schedule, the best one."""
+"""Chapter 9, accuracy of the reel unit at every pair of radii: printed law, scheduled law, best law."""
 
 from functools import cache
 from itertools import product
@@ -14,13 +14,13 @@ from rtctl.reproduce.chapter08 import SLACK
 from rtctl.reproduce.played import config, reels
 from rtctl.reproduce.rows import Part, Picture, Row, under
 
-RADII = (0.020, 0.025, 0.030, 0.035, 0.040)  # m, each with each
-LINES = {10000: 2500, 500: 125}  # lines of the encoder by counts a turn
-AT = (0.5, 3.0, 5.5, 8.0)  # s, of the steps
-TO = (-1.0, 0.0, 1.0, 0.0)  # rad
-LAST = 2.5  # s, of each
-BAND = 0.2  # mm, within which a step has settled: more than a count of 500
-OFF = 0.1  # share by which the friction of a motor is another than the law believes
+RADII = (0.020, 0.025, 0.030, 0.035, 0.040)  # m, all combinations
+LINES = {10000: 2500, 500: 125}  # counts per turn -> lines of the encoder
+AT = (0.5, 3.0, 5.5, 8.0)  # s, times of the steps
+TO = (-1.0, 0.0, 1.0, 0.0)  # rad, targets of the steps
+LAST = 2.5  # s, length of each step
+BAND = 0.2  # mm, settling band: more than a count of 500 per turn
+OFF = 0.1  # relative error of the motor friction in the law
 
 LAWS = {  # name -> words
     "printed": "PD as printed, 6.2 A/rad and 0.16 s, friction 2.4 mNm",
@@ -80,16 +80,16 @@ ACCURACY = under(
 
 
 class Outcome(NamedTuple):
-    """Steps of a radian at one pair of radii."""
+    """Metrics of steps of a radian at one pair of radii."""
 
-    error: float  # mm, largest at the end of a step, by the emulator
-    settling: float  # s, slowest; that of a whole step where one does not settle
+    error: float  # mm, largest true error at the end of a step
+    settling: float  # s, slowest; the length of a step where a step does not settle
     tension: float  # N, least
     tripped: str
 
 
 def changed(law: str, counts: int, R1: float, R2: float, off: float) -> Any:
-    """Config of a law with reels of these radii (m), friction of the motors `off` as a share."""
+    """Config of a law with reel radii in m; `off` is the relative change of the motor friction."""
     at_all: dict[str, Any] = {
         "plant.physics": SLACK,
         "safety.following_error": 0,
@@ -108,13 +108,13 @@ def changed(law: str, counts: int, R1: float, R2: float, off: float) -> Any:
 
 
 def table() -> list[dict[str, float]]:
-    """The steps."""
+    """Steps of the reference."""
     return [{"at": at, "to": to} for at, to in zip(AT, TO, strict=True)]
 
 
 @cache
 def outcome(law: str, counts: int, R1: float, R2: float, off: float = 0.0) -> Outcome:
-    """Steps with a law at one pair of radii, m."""
+    """Outcome of the steps with a law at one pair of radii in m."""
     run = fused.run(changed(law, counts, R1, R2, off), AT[-1] + LAST + 1.0)
     if run.tripped:
         return Outcome(np.nan, np.nan, np.nan, run.tripped)
@@ -137,7 +137,7 @@ def every(law: str, counts: int, short: bool, off: float = 0.0) -> list[Outcome]
 
 
 def largest(law: str, counts: int, short: bool, off: float = 0.0) -> float:
-    """Largest error over the radii, mm; of the runs that did not trip. Raises NoAnswer where all of them did."""
+    """Largest error in mm over the radii, of runs without trip. Raises NoAnswer where all runs tripped."""
     errors = [one.error for one in every(law, counts, short, off) if not one.tripped]
     if not errors:
         raise NoAnswer(f"{LAWS[law]}: every run tripped")
@@ -157,7 +157,7 @@ def accuracy(short: bool) -> dict[str, float]:
         "9.largest_best": max(one.error for one in best),
         "9.largest_best_off": max(largest("best", 10000, True, share) for share in (-OFF, OFF)),
         "9.settling_best": max(one.settling for one in best) / max(one.settling for one in plain),
-        "9.tension_best": round(min(one.tension for one in best), 9),  # rounding of a tape that hangs
+        "9.tension_best": round(min(one.tension for one in best), 9),  # removes rounding errors of a slack tape
         "9.largest_shipped_500": largest("shipped", 500, short),
         "9.largest_coarse_500": coarse,
         "9.largest_demand_500": coarse,

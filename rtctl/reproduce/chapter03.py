@@ -1,4 +1,4 @@
-"""Chapter 3, redesign concept: the old unit, where its images stand, and where those of the redesign do."""
+"""Chapter 3, redesign concept: image positions of the old unit and of the redesign."""
 
 from functools import cache
 
@@ -16,7 +16,7 @@ FULL, EMPTY, MEAN = 0.04, 0.02, 0.03  # m, radii of a reel
 MOVE, RAMP, REST = 16.0, 1.6, 3.0  # rad and rad/s of the capstan: 0.2 m at 0.02 m/s; s
 SLIP, F_T = 3.0e-3, 0.1  # Nm and N of the old unit (5.1)
 MODULUS, THICK, WIDE = 3e9, 0.1e-3, 0.037  # Pa and m: paper of 0.1 mm
-GUIDES = 2  # that turn the tape by a right angle each
+GUIDES = 2  # guides that deflect the tape by 90 degrees each
 SLACK = [{"term": "tape.slack", "node": "tape1"}]
 OLD, NEW = "stepping motor, open loop", "shipped PD"
 SMALL = f"{GUIDES} guides of small radius at right angles, paper of 0.1 mm and 3 GPa"
@@ -58,23 +58,23 @@ OLD_UNIT = under(
 
 
 def excess() -> float:
-    """Length in m that the path has beyond a limp tape at F_t."""
+    """Path length in m beyond that of a limp tape, at F_t."""
     B = MODULUS * WIDE * THICK**3 / 12.0
     return GUIDES * path_length.excess(B, F_T, 0.5 * np.pi)
 
 
 def places(short: bool) -> np.ndarray:
-    """Radii (n,) of reel 1 in m as it empties; the middle one is the mean."""
+    """Radii (n,) of reel 1 in m during unwinding; the middle radius is the mean."""
     return np.linspace(FULL, EMPTY, 5 if short else 11)
 
 
 def other(R: float) -> float:
-    """Radius in m of reel 2 where reel 1 has `R` m: no tape is lost."""
+    """Radius in m of reel 2 for radius `R` in m of reel 1, by conservation of tape."""
     return float(np.sqrt(FULL**2 + EMPTY**2 - R**2))
 
 
 def moves() -> tuple[dict[str, object], float, float]:
-    """Two moves from print to scan position, when the second one has come to rest, and where it should be, rad."""
+    """Reference of two moves from print to scan position, time in s of rest after the second, its target in rad."""
     lasts = MOVE / RAMP + REST
     steps = [{"at": 0.5 + k * lasts, "to": -MOVE * (k + 1), "ramp": RAMP} for k in range(2)]
     return {"steps": steps}, 0.5 + 2 * lasts, -2 * MOVE
@@ -82,7 +82,7 @@ def moves() -> tuple[dict[str, object], float, float]:
 
 @cache
 def old_image(R: float, longer: float) -> float:
-    """Where an image of the old unit stands with reel 1 at `R` m, m; the path is `longer` m at 0.1 N."""
+    """Image position of the old unit in m with radius `R` in m of reel 1; `longer` in m is the excess path at 0.1 N."""
     reference, end, target = moves()
     term = {"term": "tape.path_length", "node": "path", "excess": longer, "F_t": F_T}
     made = config("ivu-old", {"reference": reference, "plant.physics": [term] if longer else [], **old_reels(R)})
@@ -92,7 +92,7 @@ def old_image(R: float, longer: float) -> float:
 
 
 def old_reels(R: float) -> dict[str, float]:
-    """Keys of the old unit's reels with reel 1 at `R` m (4.1)."""
+    """Settings of the old unit's reels with radius `R` in m of reel 1 (4.1)."""
     paper = 0.5 * np.pi * 1.7e3 * WIDE
     changes = {}
     for name, radius in (("reel1", R), ("reel2", other(R))):
@@ -103,7 +103,7 @@ def old_reels(R: float) -> dict[str, float]:
 
 @cache
 def new_image(R: float) -> tuple[float, float]:
-    """Where an image of the redesign stands with reel 1 at `R` m, and the error of its capstan, both m."""
+    """Image position of the redesign with radius `R` in m of reel 1, and error of its capstan, both in m."""
     reference, end, target = moves()
     changes = {"reference": reference, "plant.physics": SLACK, "safety.following_error": 0}
     run = play(reels(R, other(R), changes), end + 0.5)
@@ -116,19 +116,19 @@ def new_image(R: float) -> tuple[float, float]:
 
 @cache
 def old(short: bool, limp: bool = False) -> Images:
-    """Images of the old unit over the radii, the window set at the mean radius."""
+    """Images of the old unit over the radii, with the window adjusted at the mean radius."""
     longer = 0.0 if limp else excess()
     return camera.images([old_image(float(R), longer) for R in places(short)], old_image(MEAN, longer))
 
 
 @cache
 def new(short: bool) -> Images:
-    """Images of the redesign, the same."""
+    """Images of the redesign over the radii, with the window adjusted at the mean radius."""
     return camera.images([new_image(float(R))[0] for R in places(short)], new_image(MEAN)[0])
 
 
 def story(short: bool) -> dict[str, float]:
-    """The old unit and the redesign over the radii."""
+    """Rows of the old unit and the redesign over the radii."""
     before, after = old(short), new(short)
     capstan = max(abs(new_image(float(R))[1]) for R in places(short))
     return {

@@ -1,4 +1,4 @@
-"""Chapter 4, modelling: inertia that follows the tape, modes of the simulation set (figures 4.2 and 4.3)."""
+"""Chapter 4, modelling: inertia by wound tape, modes of the simulation set (figures 4.2 and 4.3)."""
 
 from functools import cache
 from typing import NamedTuple
@@ -14,8 +14,8 @@ from rtctl.reproduce.rows import Part, Picture, Row, under
 
 MOVE, SPEED = 0.2, 0.02  # m and m/s, of one operation (3, 4.1)
 R_C = 0.0125  # m
-LISTED, PAPER = 0.5e-3, 0.05e-3  # m, thickness in appendix A, and the one that figure 4.2 was drawn with
-ASKED_J_10 = 3.2e-5  # kg m^2, with which the mode of an empty reel is at 250 Hz
+LISTED, PAPER = 0.5e-3, 0.05e-3  # m, tape thickness of appendix A and of figure 4.2
+ASKED_J_10 = 3.2e-5  # kg m^2, J_10 for a mode of an empty reel at 250 Hz
 PAIRS = ((0.02, 0.02), (0.02, 0.04), (0.04, 0.02), (0.04, 0.04))  # m, of figure 4.3
 
 SIMULATION = "simulation"
@@ -55,13 +55,13 @@ ROWS = under(
 
 class Change(NamedTuple):
     R1: float  # m, before the move
-    R: float  # %, of the radius
-    J: float  # %, of the inertia
+    R: float  # %, change of the radius
+    J: float  # %, change of the inertia
 
 
 @cache
 def move(R1: float, d_tape: float) -> Change:
-    """One move of 0.2 m that winds paper of `d_tape` m on reel 1, played on the emulator."""
+    """Changes by a move of 0.2 m on the emulator that winds paper of thickness `d_tape` in m on reel 1."""
     changes = {
         "plant.set": "simulation",
         "plant.parameters.d_tape": d_tape,
@@ -89,7 +89,7 @@ def damped_modes(model: response.Model) -> np.ndarray:
 
 
 def mass_line(model: response.Model, low: float, high: float) -> tuple[float, float]:
-    """Frequencies in Hz of the least and of the largest |H| f^2 between `low` and `high` Hz."""
+    """Frequencies in Hz of the minimum and maximum of |H| f^2 between `low` and `high` Hz."""
     f = np.geomspace(low, high, 2000)
     above = np.abs(response.plant_response(model, f)) * f**2
     return float(f[np.argmin(above)]), float(f[np.argmax(above)])
@@ -102,13 +102,13 @@ def paper_mass(R: float) -> float:
 
 
 def simulated(R1: float, R2: float, **parameters: float) -> response.Loop:
-    """The simulation set of appendix A with these radii, motor 1 pulling."""
+    """Loop of the simulation set of appendix A at these radii in m, driven by motor 1."""
     changes = {f"plant.parameters.{name}": value for name, value in parameters.items()}
     return response.take(reels(R1, R2, {"plant.set": "simulation", **changes}))
 
 
 def model(short: bool) -> dict[str, float]:
-    """Moves on the emulator, modes of its matrices."""
+    """Rows of moves on the emulator, and of modes of its matrices."""
     return {
         "4.inertia_change": move(0.02, LISTED).J,
         "4.inertia_change_thin": move(0.02, PAPER).J,

@@ -18,7 +18,7 @@ from rtctl.reproduce.rows import Part, Picture, Row, under
 
 K_P, W_N = 31.6, 2 * np.pi  # rad/s^2/A and rad/s, of section 5.2
 AMPERE_PER_VOLT = 0.2
-LISTED, HEAVY = 7.5e-4, 1.5e-3  # kg m^2, J_m of the simulation set, and the identified one with which K_p is 31.6
+LISTED, HEAVY = 7.5e-4, 1.5e-3  # kg m^2, J_m of the simulation set, and identified J_m, for which K_p is 31.6
 REELS = ((0.04, 0.02), (0.03, 0.03), (0.02, 0.04))  # m
 CORNERS = ((0.04, 0.02), (0.02, 0.04), (0.04, 0.04), (0.02, 0.02))  # m
 
@@ -96,7 +96,7 @@ DESIGN = under(
 
 
 def tension(short: bool) -> dict[str, float]:
-    """Volts that the machine writes at rest, as a torque."""
+    """Rows of the tension torque, from the voltages at rest."""
     made = reels(0.03, 0.03, {"law.friction": {"motor1": {"tau_C": 0.0}, "motor2": {"tau_C": 0.0}}})
     run = play(made, 2.0)
     torque = ivu.parameters(made.plant).K_m1 * AMPERE_PER_VOLT * float(run["u1"][-200:].mean())
@@ -104,7 +104,7 @@ def tension(short: bool) -> dict[str, float]:
 
 
 def radii(short: bool) -> dict[str, float]:
-    """(5.3) for the numbers of the text, (5.2) on the emulator."""
+    """Rows of (5.3) for the numbers of the text, and of (5.2) on the emulator."""
     off, between = [], []
     for R1, R2 in REELS:
         record = take(play(rr.radius_config(reels(R1, R2), travel=1.9 + 2 * rr.RUN_IN + 0.05), 12.0))
@@ -134,7 +134,7 @@ def process_gain(J_m: float, short: bool) -> float:
 
 
 class Corner(NamedTuple):
-    """The loop of (5.4) without delay, at a pair of radii."""
+    """Figures of merit of the loop of (5.4) without delay, at a pair of radii."""
 
     L: margins.Response
     margins: margins.Margins
@@ -143,7 +143,7 @@ class Corner(NamedTuple):
 
 @cache
 def corner(R1: float, R2: float, J_m: float = LISTED) -> Corner:
-    """The PD of section 5.2 on the simulation set, with its own J_m or another one (kg m^2)."""
+    """Loop with the PD of section 5.2 on the simulation set, with motor inertia `J_m` in kg m^2."""
     G, tau_d = pd.design(K_P, W_N)
     model = response.take(reels(R1, R2, {"plant.set": "simulation", "plant.parameters.J_m1": J_m,
                                          "plant.parameters.J_m2": J_m})).model  # fmt: skip
@@ -158,7 +158,7 @@ def corner(R1: float, R2: float, J_m: float = LISTED) -> Corner:
 
 
 def design(short: bool) -> dict[str, float]:
-    """K_p as it is measured, PD by (5.4), and the loop over the radii."""
+    """Rows of the measured K_p, the PD by (5.4), and the loop over the radii."""
     G, tau_d = pd.design(K_P, W_N)
     widths = [corner(*R).bandwidth for R in CORNERS]
     heavy = [corner(*R, HEAVY).bandwidth for R in CORNERS]

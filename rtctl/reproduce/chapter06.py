@@ -14,9 +14,9 @@ from rtctl.reproduce.chapter05 import AMPERE_PER_VOLT, K_P, W_N
 from rtctl.reproduce.played import play, reels
 from rtctl.reproduce.rows import Part, Picture, Row, under
 
-NO_GAIN = 1e-6  # V/rad, so little that the position changes no voltage: the reference is the voltage
-KICK = 0.1  # V, of one motor more
-UP, DOWN, SECOND = 2.0, 4.0, 1.0  # s: motor 2 pulls more, motor 1 does, for how long
+NO_GAIN = 1e-6  # V/rad, too small for an effect of the position: the reference sets the voltage
+KICK = 0.1  # V, added to one motor
+UP, DOWN, SECOND = 2.0, 4.0, 1.0  # s: start of the added voltage on motor 2, on motor 1, and its duration
 MOVE = 8.0  # rad of the capstan, 0.1 m
 SPEED = 1.6  # rad/s, 0.02 m/s (3)
 BARE = {"law.shaper": {}, "law.inertia": {}, "safety.following_error": 0, "safety.current_time": 0}
@@ -63,7 +63,7 @@ CLOSED = under(
 
 @cache
 def without_loop() -> Run:
-    """Figure 6.1: tension at once, then motor 2 pulls more for a second, then motor 1; no friction, as its formula."""
+    """Run of figure 6.1: tension from the start, KICK on motor 2 for a second, then on motor 1; without friction."""
     steps = [(UP, -KICK), (UP + SECOND, 0.0), (DOWN, KICK), (DOWN + SECOND, 0.0)]
     changes: dict[str, Any] = {
         **BARE,
@@ -79,7 +79,7 @@ def without_loop() -> Run:
 
 
 def open_loop(short: bool) -> dict[str, float]:
-    """Deflection before motor 2 pulls more, tension while nobody does."""
+    """Rows of the deflection before the step of motor 2, and of the tension before any step."""
     run = without_loop()
     still, moving = run.between(UP - 0.5, UP), run.between(UP + SECOND + 0.7, DOWN)
     return {
@@ -89,7 +89,7 @@ def open_loop(short: bool) -> dict[str, float]:
 
 
 def arming(short: bool) -> dict[str, float]:
-    """Radii that the machine measures by itself when it is armed, against the truth."""
+    """Rows of the radii measured at arming, against the true radii."""
     pairs = ((0.038, 0.022),) if short else ((0.038, 0.022), (0.02, 0.04), (0.04, 0.02), (0.03, 0.03))
     off = []
     for R1, R2 in pairs:
@@ -101,7 +101,7 @@ def arming(short: bool) -> dict[str, float]:
 
 @cache
 def move(increments: int = 500, compensated: bool = True) -> Run:
-    """Figure 6.2: a move of 0.1 m at 0.02 m/s with the PD of (5.4), R1 = 20 and R2 = 40 mm."""
+    """Run of figure 6.2: a move of 0.1 m at 0.02 m/s with the PD of (5.4), R1 = 20 and R2 = 40 mm."""
     G, tau_d = pd.design(K_P, W_N)
     tau_C = ivu.parameters(reels(0.02, 0.04, {"plant.set": "simulation"}).plant).tau_F1 if compensated else 0.0
     changes: dict[str, Any] = {
@@ -117,7 +117,7 @@ def move(increments: int = 500, compensated: bool = True) -> Run:
 
 
 def overshoot(run: Run) -> float:
-    """How far the capstan went beyond the move, mm of paper."""
+    """Overshoot of the capstan beyond the move, in mm of paper."""
     return 1e3 * R_C * max(float(run["truth_capstan"].max()) - MOVE, 0.0)
 
 
@@ -128,7 +128,7 @@ def tension_moving(run: Run) -> float:
 
 
 def closed_loop(short: bool) -> dict[str, float]:
-    """Overshoot and tension of the move."""
+    """Rows of overshoot and tension of the move."""
     return {
         "6.overshoot": overshoot(move()),
         "6.overshoot_10000": overshoot(move(10000)),
@@ -139,7 +139,7 @@ def closed_loop(short: bool) -> dict[str, float]:
 
 
 def figure_6_1(short: bool) -> Picture:
-    """Currents, tensions, reels before two seconds, reels and capstan."""
+    """Figure of currents, tensions, reels before two seconds, reels and capstan."""
     run = without_loop()
     rows = run.between(0.0, 6.0)
     t = rows["t"] - run.start
@@ -172,7 +172,7 @@ def figure_6_1(short: bool) -> Picture:
 
 
 def figure_6_2(short: bool) -> Picture:
-    """Capstan, motors, tracking error, tension of the move with 10000 counts."""
+    """Figure of capstan, motors, tracking error and tension of the move with 10000 counts."""
     run = move(10000)
     rows = run.between(0.0, 8.5)
     t = rows["t"] - run.start

@@ -12,8 +12,8 @@ from rtctl.reproduce import figures as fig
 from rtctl.reproduce.played import config, play
 from rtctl.reproduce.rows import NONE, Part, Picture, Row, under
 
-STALL, SLIP = 0.1, 2.5e-3  # A that moves the fullest reel, and Nm of the slip couplings (7.3)
-SLIP_5 = 3.0e-3  # Nm, the same by 5.1
+STALL, SLIP = 0.1, 2.5e-3  # A, current that moves a full reel; Nm, torque of the slip couplings (7.3)
+SLIP_5 = 3.0e-3  # Nm, torque of the slip couplings by 5.1
 GEAR, NOMINAL, AT_NOMINAL, AT_NO_LOAD = 150.4, 0.45, 0.118, 0.024  # ratio, Nm and A of motor 707 (appendix E)
 ACCURACY = 1e-3  # m, of positioning (7.4)
 
@@ -68,10 +68,10 @@ MOTOR = under(
 
 
 def driver(short: bool) -> dict[str, float]:
-    """The shipped driver's components through (7.1) to (7.3)."""
+    """Rows of (7.1) to (7.3) with the components of the shipped driver."""
     p = L292Settings()
     loop = 2 * p.V_S / (p.V_R * p.R_M) * p.R_S  # G_mo R_S
-    wanted = 2 * p.R_F * p.C_F * loop / p.R_4  # C for zeta^2 = 1/2
+    wanted = 2 * p.R_F * p.C_F * loop / p.R_4  # C in F for zeta^2 = 1/2
     f = np.geomspace(10.0, 1e5, 4000)
     H = np.abs(l292.transfer_function(p, f))
     return {
@@ -86,7 +86,7 @@ def driver(short: bool) -> dict[str, float]:
 
 
 def motors(short: bool) -> dict[str, float]:
-    """Torques by the motor constant, and what the machine's own steps take."""
+    """Rows of torques by the motor constant, and of the torque in steps of the machine."""
     made = config("ivu", {"reference": {"steps": [{"at": 0.5, "to": 1.0}, {"at": 3.0, "to": 0.0}]}})
     p = ivu.parameters(made.plant)
     run = play(made, 5.0)
@@ -102,7 +102,7 @@ def motors(short: bool) -> dict[str, float]:
 
 
 def figure_7_4(short: bool) -> Picture:
-    """Response of the driver, as (7.1) and after the cancellation."""
+    """Figure of the response of the driver, by (7.1) and after the cancellation."""
     f = np.geomspace(10.0, 1e5, 400)
     figure, (above, turn) = fig.panels(2, sharex=True)
     full, short_form = l292.transfer_function(L292Settings(), f), drive(config("ivu"), f)

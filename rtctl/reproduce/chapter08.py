@@ -1,4 +1,4 @@
-"""Chapter 8, test results: the reel unit identified, its friction, its loop, its steps (figures 8.2 to 8.6)."""
+"""Chapter 8, test results: identification, friction, loop and steps of the reel unit (figures 8.2 to 8.6)."""
 
 from functools import cache
 from typing import Any
@@ -19,14 +19,14 @@ from rtctl.reproduce.rows import NONE, Row, under
 
 W_N = 4 * np.pi  # rad/s (8.2)
 BELIEVED = {"J_m": 1.5e-3, "c": 450.0, "k": 12.5, "c_m": 12.0, "k_m": 1.3e-2}
-ASKED = ("c", "c_m", "k_m", "J_m")  # of an unknown machine, beside K_p
-REELS = ((0.038, 0.022), (0.022, 0.038), (0.031, 0.031))  # m, three pairs that tell the frictions apart
-NOISE_RMS = 0.7  # V, with which u keeps within 5 V beside what tension and friction take
-LOOP_RMS = 2.0  # V, so much that a count of the encoder, 1.6 V through tau_d, does not matter
+ASKED = ("c", "c_m", "k_m", "J_m")  # parameters of an unknown machine, beside K_p
+REELS = ((0.038, 0.022), (0.022, 0.038), (0.031, 0.031))  # m, three pairs that separate the frictions
+NOISE_RMS = 0.7  # V, keeps u within 5 V together with tension and friction
+LOOP_RMS = 2.0  # V, large against a count of the encoder, 1.6 V through tau_d
 TAU_C, UNDER = 2.4e-3, 1.5e-3  # Nm, compensated in figure 8.6 (a) and (b)
 
-PRINTED_ERROR = 10.6e-3  # rad, the larger error of figure 8.6(a) as it is printed
-SLACK = [{"term": "tape.slack", "node": "tape1"}]  # without it the tape pushes by 0.3 N in these steps
+PRINTED_ERROR = 10.6e-3  # rad, larger printed error of figure 8.6(a)
+SLACK = [{"term": "tape.slack", "node": "tape1"}]  # else a compression of 0.3 N in these steps
 
 MEASURING = "5 V/rad, 0.5 Vs/rad, one motor"
 PD_PRINTED = "PD as printed, 6.2 A/rad and 0.16 s"
@@ -178,25 +178,25 @@ STEPS = under(
 
 @cache
 def multisines(short: bool) -> tuple[Record, ...]:
-    """The shipped reel unit at constant speed with an odd multisine, one record a realisation."""
+    """Records of the shipped reel unit at constant speed with an odd multisine, one for each realisation."""
     played = experiment.multisine(config("ivu"))
     return tuple(take(fused.run(one.config, one.seconds)) for one in played)
 
 
 @cache
 def response_of(short: bool) -> best_linear.BestLinear:
-    """Its best linear approximation."""
+    """Best linear approximation of the shipped reel unit."""
     return best_linear.identify(list(multisines(short)))
 
 
 @cache
 def fitted(short: bool) -> model_fit.Fit:
-    """The model of chapter 4 fitted to it."""
+    """Fit of the model of chapter 4 to the best linear approximation."""
     return model_fit.fit(response_of(short).frf, config("ivu"))
 
 
 def identification(short: bool) -> dict[str, float]:
-    """Parameters of the fit; inertias by the radii; modes of the fitted matrices."""
+    """Rows of the fitted parameters, inertias by the radii, and modes of the fitted matrices."""
     found = fitted(short)
     p = ivu.parameters(found.settings)
     values = {name: e.value for name, e in found.parameters.items()}
@@ -223,7 +223,7 @@ def identification(short: bool) -> dict[str, float]:
 
 
 def capstan() -> float:
-    """Radius of the capstan in m: (5.2) the other way round, from a reel whose radius is known."""
+    """Radius of the capstan in m by inversion of (5.2), from a reel of known radius."""
     made = reels(0.038, 0.022)
     record = bench.play(reel_radius.radius_config(made))
     way = reel_radius.reel_radii(record)[0]
@@ -239,7 +239,7 @@ def noise(short: bool) -> tuple[tuple[Record, ...], sensitivity.Sensitivity]:
 
 
 def by_noise(short: bool) -> dict[str, float]:
-    """What the noise asks of the drive and what S says."""
+    """Rows of the drive voltage under noise, and of the sensitivity S."""
     records, found = noise(short)
     fit = model_fit.fit(found.frf, config("ivu"))
     return {
@@ -252,13 +252,13 @@ def by_noise(short: bool) -> dict[str, float]:
 
 
 def printed_bandwidth() -> float:
-    """Bandwidth in Hz, |T| = -3 dB, with 1 V/rad and 0.1 Vs/rad as (8.1) has them, and the delay of (8.2)."""
+    """Bandwidth in Hz, |T| = -3 dB, with 1 V/rad and 0.1 Vs/rad of (8.1), and the delay of (8.2)."""
     law_printed = {"law.position": {"gain": 1.0, "tau_d": 0.1}, "law.gain_schedule.mode": "off"}
     return margins.of_config(config("ivu", law_printed), printed=True, quick=True).bandwidth
 
 
 def unknown(short: bool) -> dict[str, float]:
-    """Machines that differ from what is believed by up to 30 %, identified from their records alone."""
+    """Rows of machines up to 30 % off their nominal values, identified from records alone."""
     off: list[float] = []
     inside: list[bool] = []
     for seed in (2,) if short else (2, 3, 5):
@@ -277,13 +277,13 @@ def unknown(short: bool) -> dict[str, float]:
 
 @cache
 def velocities(short: bool) -> tuple[Record, ...]:
-    """Constant velocities, 12 turns of the capstan each, with three pairs of reels."""
+    """Records at constant velocities of 12 capstan turns each, with three pairs of reels."""
     speeds, turns = ((0.3, 1.2, 4.0), 3.0) if short else (None, 12.0)
     return tuple(bench.play(fr.velocity_config(reels(*R), speeds, turns)) for R in REELS)
 
 
 def friction(short: bool) -> dict[str, float]:
-    """Friction of both motors, and how much it changes with speed."""
+    """Rows of the friction of both motors, and of its change with speed."""
     records, turns = velocities(short), 3.0 if short else 12.0
     tau = fr.split(records, turns)
     points, _ = fr.constant_velocity(records[0], turns)
@@ -297,7 +297,7 @@ def friction(short: bool) -> dict[str, float]:
 
 @cache
 def designed(short: bool) -> tuple[pd.PdDesign, Any]:
-    """The PD of (5.4) by the K_p of the fit, in V, and the reel unit with it, without a filter as in the text."""
+    """PD of (5.4) by the fitted K_p, in V, and config of the reel unit with it; without filter, as in the text."""
     K_p = fitted(short).K_p.value * AMPERE_PER_VOLT
     found = pd.PdDesign(K_p, *law.design(K_p, W_N))
     made = pd.applied(config("ivu", {"law.position.derivative_filter": None}), found)
@@ -306,12 +306,12 @@ def designed(short: bool) -> tuple[pd.PdDesign, Any]:
 
 @cache
 def running_loop(short: bool) -> check.Measured:
-    """Loop gain of that PD, measured while it runs."""
+    """Measured loop gain of the designed PD in closed loop."""
     return check.measure(designed(short)[1], rms=LOOP_RMS, period=4.0, f_max=80.0)
 
 
 def loop(short: bool) -> dict[str, float]:
-    """PD and its margins."""
+    """Rows of the PD and its margins."""
     found, _ = designed(short)
     reached = running_loop(short).margins
     model = robustness.at(config("ivu"), 0.038, 0.022, printed=True)
@@ -326,7 +326,7 @@ def loop(short: bool) -> dict[str, float]:
 
 
 def over_radii(short: bool) -> dict[str, float]:
-    """Margins of the printed loop (8.2) at the corners of the radii."""
+    """Rows of the margins of the printed loop (8.2) at the corners of the radii."""
     corners = {"40_40": (0.04, 0.04), "40_20": (0.04, 0.02), "20_20": (0.02, 0.02)}
     made = config("ivu")
     found = {f"8.gain_margin_{name}": robustness.at(made, *R, printed=True).GM for name, R in corners.items()}
@@ -336,25 +336,27 @@ def over_radii(short: bool) -> dict[str, float]:
 
 @cache
 def radian(tau_C: float, printed: bool = True, slack: bool = True) -> Record:
-    """Figure 8.6: steps of a radian with `tau_C` Nm of friction compensated; `printed` without the filter, `slack` of a
-    tape that cannot push."""
+    """Record of figure 8.6: steps of a radian with friction compensation of `tau_C` in Nm.
+
+    `printed`: law without filter. `slack`: tape without compression.
+    """
     changes = {"law.position.derivative_filter": None} if printed else {}
     made = config("ivu", {**changes, "plant.physics": SLACK if slack else []})
     return bench.play(steps.radian_config(made, tau_C))
 
 
 def errors(done: steps.Steps) -> list[float]:
-    """Size of the error after each step, mrad."""
+    """Absolute errors after each step, in mrad."""
     return [1e3 * abs(float(step["final_error_rad"] or 0.0)) for step in done.each]
 
 
 def overshoots(done: steps.Steps) -> list[float]:
-    """Overshoot of each step, %."""
+    """Overshoots of each step, in %."""
     return [float(step["overshoot_pct"] or 0.0) for step in done.each]
 
 
 def radians(short: bool) -> dict[str, float]:
-    """Errors and overshoot of the steps with the law as it is printed."""
+    """Rows of errors and overshoot of the steps with the printed law."""
     full, less = (steps.steps(radian(tau)) for tau in (TAU_C, UNDER))
     return {
         "8.step_error_1": errors(full)[0],
@@ -370,6 +372,6 @@ def radians(short: bool) -> dict[str, float]:
 
 
 def model_loop(short: bool, f: np.ndarray) -> np.ndarray:
-    """Loop gain (n,) of the fitted model with that PD, hold and delay as (8.2), at `f` (n,) Hz."""
+    """Loop gain (n,) of the fitted model with the designed PD, hold and delay of (8.2), at `f` (n,) in Hz."""
     L, _ = margins.loops(margins.response.take(designed(short)[1]), printed=True)
     return L(f)

@@ -1,4 +1,4 @@
-"""Chapter 9, recommended for the reel unit: a gain that follows the reel radii."""
+"""Chapter 9, recommendation for the reel unit: gain schedule by the reel radii."""
 
 from functools import cache
 
@@ -11,7 +11,7 @@ from rtctl.reproduce.chapter08 import SLACK
 from rtctl.reproduce.played import reels
 from rtctl.reproduce.rows import Part, Row, under
 
-FULL = (0.04, 0.04)  # m, where a fixed gain is nearest to its limit
+FULL = (0.04, 0.04)  # m, radii with the least margin of a fixed gain
 PAIRS = (FULL, (0.04, 0.02), (0.02, 0.04), (0.03, 0.03), (0.025, 0.035))  # m; an empty pair trips sensors_disagree
 FIXED, SCHEDULED = "PD as printed, fixed gain", "PD as printed, gain scheduled for 6 dB and 45 deg"
 SLACK_SET = "identified, tape.slack"
@@ -43,13 +43,13 @@ SCHEDULE = under(
 
 @cache
 def designed() -> schedule.Schedule:
-    """A table of factors that keeps 6 dB and 45 deg on the loop as it is printed."""
+    """Gain schedule that keeps margins of 6 dB and 45 deg on the printed loop."""
     return schedule.design(reels(*FULL), GM=6.0, printed=True)
 
 
 @cache
 def worst(scheduled: bool) -> float:
-    """Largest error in mm of steps of a radian over the pairs of radii, the law as printed."""
+    """Largest error in mm of steps of a radian over the pairs of radii, with the printed law."""
     found = []
     for R1, R2 in PAIRS:
         made = reels(R1, R2, {"law.position.derivative_filter": None, "plant.physics": SLACK})
@@ -59,7 +59,7 @@ def worst(scheduled: bool) -> float:
 
 
 def scheduled(short: bool) -> dict[str, float]:
-    """Margins and errors of steps without and with the schedule."""
+    """Rows of margins and errors of steps without and with the schedule."""
     found = designed()
     return {
         "9.gain_margin_fixed": found.fixed.worst[0],

@@ -6,7 +6,7 @@ from rtctl.identify import bench, steps
 from rtctl.reproduce.played import config
 from rtctl.reproduce.rows import Part, Row, under
 
-PRESENT_LAW = "present controller, gains chosen here: 6400 V/m, 4 s, 172 Vs/m"  # those of the shipped config
+PRESENT_LAW = "present controller, gains chosen here: 6400 V/m, 4 s, 172 Vs/m"  # gains of the shipped config
 SIZES = {"10.step_twelfth": steps.TWELFTH, "10.step_twenty_fourth": steps.TWENTY_FOURTH}
 
 STEPS = under(
@@ -21,7 +21,7 @@ STEPS = under(
 
 
 def stepping(short: bool) -> dict[str, float]:
-    """The printing steps of the shipped linear drive, there and back."""
+    """Rows of the printing steps of the shipped linear drive, forward and back."""
     values = {}
     for name, size in SIZES.items():
         done = steps.steps(bench.play(steps.printing_config(config("ldu"), size, 6 if short else 24)), "scale")

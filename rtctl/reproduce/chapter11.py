@@ -1,4 +1,4 @@
-"""Chapter 11, measurement error: where the position error of the linear drive comes from, its wavelengths, its cure."""
+"""Chapter 11, measurement error: origins, wavelengths and correction of the position error of the linear drive."""
 
 from functools import cache
 from typing import Any
@@ -15,11 +15,11 @@ from rtctl.reproduce.chapter10 import PRESENT_LAW
 from rtctl.reproduce.played import config
 from rtctl.reproduce.rows import NONE, Row, under
 
-R_C = 3e-3  # m, believed
+R_C = 3e-3  # m, nominal
 TURN = 2 * np.pi * R_C  # m
 LENGTH, N = 0.6, 1200  # m and steps of the analysis (11.2)
-TRAVEL = 0.612  # m, of which the image of the luminance loses a little
-SPEEDS = (0.05, 0.03)  # m/s, of the two passes that tell position from time
+TRAVEL = 0.612  # m; the luminance image is slightly shorter
+SPEEDS = (0.05, 0.03)  # m/s, speeds of two passes that separate position from time
 OVAL, ECCENTRICITY, R_G, COUPLING = 2e-6, 5e-6, 19e-3, 1e-3  # m, m, m, rad (11.1)
 
 VELOCITY = "velocity 200 Hz"
@@ -91,7 +91,7 @@ TABLE = under(
 
 
 def terms(bearing: float | None = None, coupling: float | None = None, capstan: float | None = 0.0) -> list[Any]:
-    """Terms of physics for the errors of 11.1, each with its phase in rad, None without it."""
+    """Plant terms for the errors of 11.1; each argument is a phase in rad, None without the error."""
     encoder = {"term": "ripple.encoder", "node": "encoder"}
     found: list[Any] = []
     if capstan is not None:
@@ -105,25 +105,25 @@ def terms(bearing: float | None = None, coupling: float | None = None, capstan: 
 
 @cache
 def rippled(bearing: float | None, coupling: float | None, capstan: float | None) -> Pass:
-    """A pass of the linear drive with nothing wrong but these."""
+    """Pass of the linear drive with only these errors."""
     made = bench.changed(config("ldu"), {"plant.physics": terms(bearing, coupling, capstan)})
     (one,) = scale_error.passes(bench.play(scale_error.scale_config(made, 6 * TURN, SPEEDS[0])))
     return one
 
 
 def amplitude(one: Pass) -> float:
-    """Of the wave that comes once a turn, m."""
+    """Amplitude in m of the error with one period per turn."""
     return float(np.sqrt(2)) * error_table.periodic(one.x, one.e, TURN, harmonics=1)
 
 
 def turn() -> float:
-    """Way of a turn of the capstan by the scale, m."""
+    """Travel in m of a capstan turn by the scale."""
     one = rippled(None, None, None)
     return TURN * (1 + float(np.polyfit(one.x, one.e, 1)[0]))
 
 
 def origins(short: bool) -> dict[str, float]:
-    """Each error alone and all together, on the emulator."""
+    """Rows of each error alone and of all errors together, on the emulator."""
     return {
         "11.wavelength": 1e3 * turn(),
         "11.capstan": 1e6 * 2 * amplitude(rippled(None, None, 0.0)),
@@ -136,21 +136,21 @@ def origins(short: bool) -> dict[str, float]:
 
 @cache
 def printer(speed: float) -> Pass:
-    """A pass of the printer of chapter 11 along its scale."""
+    """Pass of the printer of chapter 11 along its scale at `speed` in m/s."""
     (one,) = scale_error.passes(bench.play(scale_error.scale_config(config("ldu_printer"), TRAVEL, speed)))
     return one
 
 
 @cache
 def analysed(speed: float) -> tuple[Spectrum, tuple[Peak, ...]]:
-    """Spectrum over 600 mm and its peaks."""
+    """Spectrum over 600 mm and its peaks, of a pass at `speed` in m/s."""
     one = printer(speed)
     found = wavelength.spectrum(one.x, one.e, N, LENGTH)
     return found, wavelength.peaks(found, R_C)
 
 
 def by_scale(short: bool) -> dict[str, float]:
-    """Trend and peaks of the printer, and what the peaks go with."""
+    """Rows of trend and peaks of the printer, and of the origin of the peaks."""
     one = printer(SPEEDS[0])
     inside = one.x <= LENGTH
     trend = scale_error.scale_error(one.x[inside], one.e[inside], R_C)
@@ -170,16 +170,16 @@ def by_scale(short: bool) -> dict[str, float]:
 
 @cache
 def image() -> tuple[Image, Cross]:
-    """A grey image printed by that pass, and its cross spectrum with the error."""
+    """Grey image printed by a pass of the printer, and its cross spectrum with the error."""
     one = printer(SPEEDS[0])
     made = luminance.printed(one.x, one.e)
     return made, luminance.cross_spectrum(one.x, one.e, made, N, LENGTH)
 
 
 def by_luminance(short: bool) -> dict[str, float]:
-    """Peaks of the luminance, of the cross spectrum, and the band around a turn."""
+    """Rows of the peaks of luminance and cross spectrum, and of the band around a turn."""
     made, cross = image()
-    near = np.where(cross.wavelength < 0.1, cross.amplitude, 0.0)  # ink and paper drift over longer ways
+    near = np.where(cross.wavelength < 0.1, cross.amplitude, 0.0)  # ink and paper drift dominates longer wavelengths
     return {
         "11.peak_luminance": 1e3 * float(cross.wavelength[np.argmax(near)]),
         "11.peak_cross": 1e3 * luminance.shared(cross)[0][0],
@@ -189,7 +189,7 @@ def by_luminance(short: bool) -> dict[str, float]:
 
 @cache
 def left(values: tuple[float, ...], speed: float) -> tuple[np.ndarray, np.ndarray]:
-    """Encoder position and error (both m) of the printer with a table in its sensors, between its ends."""
+    """Encoder position and error (both in m) of the printer with an error table, within the table's range."""
     made = set_path(config("ldu_printer"), "sensors.correction", {"period": TURN, "values": list(values)})
     record = bench.play(scale_error.scale_config(made, TRAVEL, speed))
     x = record["encoder_counts"] * (2 * np.pi / bench.counts_per_turn(record)) * R_C
@@ -198,7 +198,7 @@ def left(values: tuple[float, ...], speed: float) -> tuple[np.ndarray, np.ndarra
 
 
 def tables(short: bool) -> dict[str, float]:
-    """Tables from the scale and from an image, played in the printer; the image's gain is from a pass of its own."""
+    """Rows of error tables from scale and from image; the gain of the image comes from a separate pass."""
     none = (0.0, 0.0)
     (x, e), (x_2, e_2) = (left(none, speed) for speed in SPEEDS)
     by_image, known = (luminance.printed(*both, luminance.PrintSettings(seed=s)) for s, both in

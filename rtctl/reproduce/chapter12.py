@@ -18,12 +18,12 @@ from rtctl.reproduce.played import config, crossover
 from rtctl.reproduce.rows import Row, under
 
 L_S, L_T, L_C = 1.0e-3, 2.0e-3, 1.0e-2  # m, lengths of motor shaft, wheel and capstan (appendix F)
-ACTS = 3.0  # dB, least depth of a notch that acts
+ACTS = 3.0  # dB, least depth of an effective notch
 LISTED = (("resonance_1", 114.0, 239.0), ("anti_resonance", 254.0, 919.0), ("resonance_2", 286.0, 951.0),
           ("resonance_3", 2100.0, 3261.0))  # fmt: skip
 SPEEDS = (2.0, 6.0, 12.0, 18.0)  # rad/s of the capstan
-RMS = {"present": 0.3, "shaped": 0.6}  # V, of the multisine in the running loop
-TOP = 150.0  # Hz, of it; more lines would have less of it each
+RMS = {"present": 0.3, "shaped": 0.6}  # V, rms of the multisine in closed loop
+TOP = 150.0  # Hz, top of the multisine; a wider band leaves less rms for each line
 PRINT = {"reference": {"steps": [{"at": 0.5, "to": 1e-3 / 12}, {"at": 1.0, "to": 2e-3 / 12}]}}
 
 DRAWN = "k_s = 4.2 and k_c = 7.6 Nm/rad and M = 1.25 kg, from these four frequencies"
@@ -181,7 +181,7 @@ SHAPED = under(
 
 
 def modes(short: bool) -> dict[str, float]:
-    """Undamped modes of both sets."""
+    """Rows of the undamped modes of both parameter sets."""
     values: dict[str, float] = {}
     for name, end in (("figure_12_2", ""), ("appendix_f", "_listed")):
         found = mechanics.modes(mechanics.named(name))
@@ -198,12 +198,12 @@ def modes(short: bool) -> dict[str, float]:
 
 @cache
 def curve() -> DriverCurve:
-    """The amplifier of the printer, 0 to 3 V, the carriage held."""
+    """Characteristic of the printer's amplifier, 0 to 3 V, with blocked carriage."""
     return driver_curve.driver_curve(bench.play(driver_curve.driver_config(config("ldu_printer"))))
 
 
 def amplifier(short: bool) -> dict[str, float]:
-    """(12.3) as it is measured."""
+    """Rows of the measured (12.3)."""
     found = curve()
     K_m = mechanics.named().K_m1
     return {
@@ -218,20 +218,20 @@ def amplifier(short: bool) -> dict[str, float]:
 
 @cache
 def noise() -> tuple[tuple[Record, ...], sensitivity.Sensitivity]:
-    """The linear drive at 5 mm/s with noise of 0.25 V, and its sensitivity."""
+    """Records of the linear drive at 5 mm/s with noise of 0.25 V, and its sensitivity."""
     records = tuple(take(fused.run(one.config, one.seconds)) for one in experiment.noise(config("ldu")))
     return records, sensitivity.identify(list(records))
 
 
 @cache
 def response_of() -> best_linear.BestLinear:
-    """Its best linear approximation."""
+    """Best linear approximation of the linear drive."""
     played = experiment.multisine(config("ldu"))
     return best_linear.identify([take(fused.run(one.config, one.seconds)) for one in played])
 
 
 def identification(short: bool) -> dict[str, float]:
-    """What noise and multisine say."""
+    """Rows of the identification by noise and by multisine."""
     records, found = noise()
     known = found.coherence > 0.5
     fit = model_fit.fit(response_of().frf, config("ldu"))
@@ -244,7 +244,7 @@ def identification(short: bool) -> dict[str, float]:
 
 
 def wheels(short: bool) -> dict[str, float]:
-    """Radii and slip of the friction wheels."""
+    """Rows of radii and slip of the friction wheels."""
     p = mechanics.named()
     R_c, R_t = 6.2e-3, 23e-3
     best = mechanics.optimum(p)
@@ -261,7 +261,7 @@ def wheels(short: bool) -> dict[str, float]:
 
 
 def notch(short: bool) -> dict[str, float]:
-    """The notch of the tick at its own frequency."""
+    """Rows of the notch of the tick at its centre frequency."""
     f, dt = 100.0, 1e-4
     section = SectionsSettings.model_validate(
         {"sections": [{"kind": "notch", "frequency": f, "zeta_z": 0.1, "zeta_p": 0.5}]}
@@ -272,7 +272,7 @@ def notch(short: bool) -> dict[str, float]:
 
 @cache
 def rubbing(short: bool) -> tuple[list[Point], list[Point]]:
-    """Break-away of the printer, and its friction at constant velocities."""
+    """Friction points of the printer: break-away, and constant velocities."""
     made = config("ldu_printer")
     turns = 2.0 if short else 6.0
     speeds = SPEEDS[::3] if short else SPEEDS
@@ -281,7 +281,7 @@ def rubbing(short: bool) -> tuple[list[Point], list[Point]]:
 
 
 def friction(short: bool) -> dict[str, float]:
-    """Break-away both ways, and against the slowest constant velocity."""
+    """Rows of the break-away friction in both directions, and over that of the slowest constant velocity."""
     away, moving = rubbing(short)
     forward = next(p.force for p in away if p.force > 0)
     backward = -next(p.force for p in away if p.force < 0)
@@ -295,20 +295,20 @@ def friction(short: bool) -> dict[str, float]:
 
 @cache
 def running(which: str) -> check.Measured:
-    """Loop gain while it runs, of the present or the shaped loop."""
+    """Measured loop gain in closed loop, of the present or the shaped loop."""
     made = config("ldu") if which == "present" else shaping.applied(config("ldu"), shaped().law)
     return check.measure(made, rms=RMS[which], f_max=TOP)
 
 
 def present(short: bool) -> dict[str, float]:
-    """Bandwidth and margin of the controller that the printer has."""
+    """Rows of bandwidth and margin of the printer's present controller."""
     reached = running("present").margins
     return {"12.present_bandwidth": reached.bandwidth, "12.present_gain_margin": reached.GM}
 
 
 @cache
 def shaped() -> shaping.Shaped:
-    """Filters by optimisation on the measured response, hold and delay in it."""
+    """Optimised filters for the measured response, which includes hold and delay."""
     frf = response_of().frf
     return shaping.of_points(frf.f, frf.H, frf.dt, None)
 
@@ -320,7 +320,7 @@ def depths(made: shaping.Shaped | None = None) -> list[float]:
 
 
 def optimised(short: bool) -> dict[str, float]:
-    """The shaped loop on the response it was made for, and while it runs."""
+    """Rows of the shaped loop, on its design response and measured in closed loop."""
     made, reached = shaped().margins, running("shaped").margins
     worth = feedforward.worth(config("ldu", PRINT), 1.6)
     return {

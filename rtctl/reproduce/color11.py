@@ -1,5 +1,7 @@
-"""Chapter 11, colour: the difference that the position error makes in a grey image, before and after each cure, and the
-coherence of the two at the three wavelengths."""
+"""Chapter 11, colour difference of a grey image by the position error, before and after each correction.
+
+Includes the coherence of error and colour at the three wavelengths.
+"""
 
 from functools import cache
 from typing import Any
@@ -15,10 +17,10 @@ from rtctl.reproduce import figures as fig
 from rtctl.reproduce.played import config
 from rtctl.reproduce.rows import Part, Picture, Row, under
 
-PRINTS = 12  # images for the coherence: ink, paper and scanner are others in each
-LINES = {"capstan": 18.75e-3, "150": 150e-3, "300": 300e-3}  # m, bins of the text
+PRINTS = 12  # images for the coherence, with independent ink, paper and scanner
+LINES = {"capstan": 18.75e-3, "150": 150e-3, "300": 300e-3}  # m, bins of the thesis
 NAMES = {"capstan": "18.75", "150": "150", "300": "300"}
-FAR = (25e-3, 120e-3)  # m, where the error has no line
+FAR = (25e-3, 120e-3)  # m, range without a line of the error
 DEVIATION = "The color spectrum of this print shows large deviation and a periodic pattern in this error"
 CLEARLY = "This figure clearly shows the effect of the mechanical errors"
 NO_EFFECT = "have no effect on the position error"
@@ -60,17 +62,17 @@ COLOR = under(
         bound="at most", expected=0.3, quote=CLEARLY, remark="no number in the text; noise alone gives 1 / prints"),
     law=ch.PRESENT_LAW, set=SET, filter=ch.VELOCITY,
 )  # fmt: skip
-BANDWIDTH = 60.0  # rad/s, of the shaper
-LEARNS = 2400.0  # V/m, that each part of a turn learns a turn: less than half of the law's gain
-LATE = 0.67  # of the pass, after which 20 turns have been learned
+BANDWIDTH = 60.0  # rad/s, bandwidth of the shaper
+LEARNS = 2400.0  # V/m, learning gain per turn of each section of a turn: less than half of the law's gain
+LATE = 0.67  # share of the pass after which 20 turns are learned
 WAYS: dict[str, dict[str, Any]] = {"before": {}, "direct": {"sensors.feedback": "scale"}}
 
 
 @cache
 def way(which: str) -> tuple[np.ndarray, np.ndarray]:
-    """Positions that are asked for (n,) and the error of what the loop takes for its position there (n,), both m.
+    """Target positions (n,) and measurement errors of the loop there (n,), both in m, filtered as in 11.2.
 
-    Filtered as in 11.2. The tracking error is left out: that of a pass is not that of printing steps.
+    The tracking error is left out: it differs between a pass and printing steps.
     """
     changes = WAYS.get(which)
     if changes is None:
@@ -86,7 +88,7 @@ def way(which: str) -> tuple[np.ndarray, np.ndarray]:
 
 
 def smooth(e: np.ndarray, dt: float) -> np.ndarray:
-    """Second-order Butterworth of 50 Hz, forwards and backwards."""
+    """Error (n,) after a second-order Butterworth filter of 50 Hz, forwards and backwards."""
     from scipy.signal import butter, sosfiltfilt
 
     return np.asarray(sosfiltfilt(butter(2, scale_error.CUTOFF, fs=1.0 / dt, output="sos"), e))
@@ -94,8 +96,7 @@ def smooth(e: np.ndarray, dt: float) -> np.ndarray:
 
 @cache
 def comes_back(repetitive: bool) -> float:
-    """Amplitude in m of the tracking error that comes back with the turn, in the last third of a pass that is measured
-    directly."""
+    """Amplitude in m of the tracking error with one period per turn, in the last third of a pass; direct feedback."""
     speed = ch.SPEEDS[0]
     made = scale_error.scale_config(config("ldu_printer"), ch.TRAVEL, speed)
     made = set_paths(made, {"sensors.feedback": "scale", "law.shaper.bandwidth": BANDWIDTH})
@@ -107,26 +108,26 @@ def comes_back(repetitive: bool) -> float:
     x = record["ref"]
     late = (x > one.start + LATE * ch.LENGTH) & (x < one.start + ch.LENGTH)
     at, e = x[late], (x - record["truth_x"])[late]
-    e = e - np.polyval(np.polyfit(at - one.start, e, 2), at - one.start)  # the integral still comes in
+    e = e - np.polyval(np.polyfit(at - one.start, e, 2), at - one.start)  # the integrator is not settled yet
     return float(np.sqrt(2)) * error_table.periodic(at, e, ch.TURN, harmonics=1)
 
 
 @cache
 def table() -> tuple[float, ...]:
-    """Error table from the scale."""
+    """Error table (n,) in m from the scale."""
     x, e = ch.left((0.0, 0.0), ch.SPEEDS[0])
     return tuple(error_table.from_scale(x, e, ch.TURN).settings.values)
 
 
 @cache
 def image(which: str) -> Colors:
-    """Grey image of a pass."""
+    """Colours of the grey image of a pass."""
     return color.printed(*way(which))
 
 
 @cache
 def coherence() -> tuple[np.ndarray, np.ndarray]:
-    """Wavelengths (k,) m and coherence (k,) of error and luminance, of prints of one pass."""
+    """Wavelengths (k,) in m and coherence (k,) of error and luminance, over prints of one pass."""
     one = ch.printer(ch.SPEEDS[0])
     at = np.linspace(0.0, ch.LENGTH, ch.N, endpoint=False)
     images = []
@@ -138,7 +139,7 @@ def coherence() -> tuple[np.ndarray, np.ndarray]:
 
 
 def colors(short: bool) -> dict[str, float]:
-    """Colour differences, and coherence."""
+    """Rows of colour differences and coherence."""
     before = image("before").rms
     length, C = coherence()
     at = {f"11.coherence_{name}": float(C[np.argmin(np.abs(length - line))]) for name, line in LINES.items()}
@@ -154,7 +155,7 @@ def colors(short: bool) -> dict[str, float]:
 
 
 def figure_11_11(short: bool) -> Picture:
-    """Colour difference over the position, and coherence over the wavelength."""
+    """Figure of the colour difference over position, and of the coherence over wavelength."""
     figure, (E, C) = fig.panels(2, height=1.9)
     for which, shade in (("before", fig.BLUE), ("table", fig.GREEN), ("direct", fig.ORANGE)):
         found = image(which)

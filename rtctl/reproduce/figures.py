@@ -1,4 +1,4 @@
-"""What the figures share: a small figure with its axes, in the colours of the other pictures, and saving it."""
+"""Common functions of the figures: axes, colours and export."""
 
 from collections.abc import Sequence
 from io import BytesIO
@@ -20,7 +20,7 @@ __all__ = [
 ]  # fmt: skip
 
 COLORS = (BLUE, ORANGE, GREEN, RED)
-DOTS = 100  # an inch
+DOTS = 100  # dots per inch
 PALETTE = 48  # colours
 
 
@@ -42,13 +42,13 @@ def panels(
 
 
 def line(axes: Axes, x: Any, y: Any, color: str = BLUE, style: str = "-", **more: Any) -> None:
-    """A line of however many points, drawn with those that can be seen."""
+    """Draw a line of any number of points by its visible points."""
     x, y = envelope(np.asarray(x, float), np.asarray(y, float), 600)
     axes.plot(x, y, style, color=color, **{"linewidth": 1.1, **more})
 
 
 def title(axes: Axes, words: str) -> None:
-    """A few words above the axes, at their left end."""
+    """Title above the axes, left-aligned."""
     axes.set_title(words, loc="left", fontsize=9)
 
 
@@ -58,7 +58,7 @@ def legend(axes: Axes, **more: Any) -> None:
 
 
 def loop(axes: Sequence[Axes], f: np.ndarray, L: np.ndarray, share: Any, color: str, style: str, words: str) -> None:
-    """|L|, |T| = share |L / (1 + L)| and |S| of a loop (n,) at `f` (n,) Hz on three axes; `words` go to the first."""
+    """Draw |L|, |T| = share |L / (1 + L)| and |S| of a loop (n,) at `f` (n,) in Hz on three axes; `words` label it."""
     opened, closed, S = axes
     opened.semilogx(f, db(L), style, color=color, linewidth=1.0, label=words)
     closed.semilogx(f, db(share * L / (1 + L)), style, color=color, linewidth=1.0)
@@ -71,16 +71,16 @@ def db(x: Any) -> np.ndarray:
 
 
 def degrees(x: Any) -> np.ndarray:
-    """Phase in degrees, without jumps, from between -360 and 0 on: a mass starts at -180."""
+    """Unwrapped phase in degrees; it starts between -360 and 0: a mass starts at -180."""
     phase = np.degrees(np.unwrap(np.angle(x)))
     return np.asarray(phase - 360 * np.round((phase[0] + 180) / 360))
 
 
 def save(figure: Figure, folder: Path, number: str) -> Path:
-    """The figure as a small PNG: `figure_8_3.png` for number 8.3."""
+    """Save a figure as a small PNG, `figure_8_3.png` for number 8.3; returns its path."""
     buffer = BytesIO()
     figure.savefig(buffer)
     path = folder / f"figure_{number.replace('.', '_')}.png"
-    with Image.open(buffer) as image, replaced(path, "wb") as file:  # few colours do for lines, and halve the bytes
+    with Image.open(buffer) as image, replaced(path, "wb") as file:  # a small palette halves the bytes
         image.convert("RGB").quantize(PALETTE).save(file, format="png", optimize=True)
     return path

@@ -1,4 +1,4 @@
-"""Figures of chapter 8, and its parts."""
+"""Figures and parts of chapter 8."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from rtctl.reproduce import figures as fig
 from rtctl.reproduce.played import config
 from rtctl.reproduce.rows import Part, Picture
 
-STRIBECK = {"term": "friction.stribeck", "node": "motor1", "F_s": 4e-3, "v_s": 0.3}  # chosen: the text has no sizes
+STRIBECK = {"term": "friction.stribeck", "node": "motor1", "F_s": 4e-3, "v_s": 0.3}  # chosen: the thesis has no values
 
 
 def figure_8_2(short: bool) -> Picture:
@@ -106,7 +106,7 @@ def figure_8_5(short: bool) -> Picture:
 
 
 def figure_8_6(short: bool) -> Picture:
-    """Steps of a radian with full and with less friction compensation, the law as printed and with its filter."""
+    """Steps of a radian with full and partial friction compensation, by the printed law and with its filter."""
     figure, axes = fig.panels(2, 2, sharex=True)
     for column, tau_C in enumerate((ch.TAU_C, ch.UNDER)):
         above, below = axes[column], axes[2 + column]
@@ -121,7 +121,7 @@ def figure_8_6(short: bool) -> Picture:
     axes[0].set_ylabel("capstan [rad]")
     axes[2].set_ylabel("error [mrad]")
     fig.legend(axes[0], loc="center right")
-    cases = ((True, True), (True, False), (False, True), (False, False))  # law as printed, tape that cannot push
+    cases = ((True, True), (True, False), (False, True), (False, False))  # (printed law, tape without compression)
     said = [" and ".join(f"{e:.1f}" for e in ch.errors(ch.steps.steps(ch.radian(ch.TAU_C, *case)))) for case in cases]
     pushes = ch.radian(ch.TAU_C, slack=False)
     least = min(float(pushes[f"truth_tension{i}"].min()) for i in (1, 2))

@@ -1,4 +1,4 @@
-"""Figures of chapter 11, and its parts."""
+"""Figures and parts of chapter 11."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -12,11 +12,11 @@ from rtctl.reproduce import color11
 from rtctl.reproduce import figures as fig
 from rtctl.reproduce.rows import Part, Picture
 
-STRIP, WAVE = 0.1e-3, 0.1  # m, of figure 11.4
+STRIP, WAVE = 0.1e-3, 0.1  # m, thickness and wavelength of the strip in figure 11.4
 
 
 def figure_11_2(short: bool) -> Picture:
-    """Deviation of the capstan's radius, and the error that it makes."""
+    """Deviation of the capstan radius, and resulting position error."""
     one = ch.rippled(None, None, 0.0)
     figure, (above, below) = fig.panels(2, sharex=True, height=1.7)
     turns = 360 * one.x / ch.TURN
@@ -32,13 +32,13 @@ def figure_11_2(short: bool) -> Picture:
 
 
 def figure_11_3(short: bool) -> Picture:
-    """Reading error of a bearing that is off centre, over a turn."""
+    """Reading error of an eccentric bearing over a turn."""
     theta = np.linspace(0, 2 * np.pi, 200)
     one = ch.rippled(0.0, None, None)
     figure, (axes,) = fig.panels(1)
     fig.line(axes, np.degrees(one.x / ch.R_C), -1e3 * (one.e - one.e.mean()) / ch.R_C, "#9ecbea", label="emulator")
     error = np.arctan(ch.ECCENTRICITY * np.cos(theta) / ch.R_G)
-    at = one.x[np.argmax(_smooth(-one.e)[one.x < ch.TURN])] / ch.R_C  # where the pass began is not where the disc did
+    at = one.x[np.argmax(_smooth(-one.e)[one.x < ch.TURN])] / ch.R_C  # start angle of the pass on the disc
     axes.plot(np.degrees(theta), 1e3 * np.interp(theta - at, theta, error, period=2 * np.pi), "--", color=fig.INK,
               linewidth=1.0, label="(11.5)")  # fmt: skip
     axes.set(xlabel="rotation [deg]", ylabel="reading error [mrad]", xlim=(0, 360))
@@ -52,7 +52,7 @@ def figure_11_3(short: bool) -> Picture:
 
 
 def figure_11_4(short: bool) -> Picture:
-    """Error by a wavy strip."""
+    """Position error by a wavy strip."""
     x = np.linspace(0, 0.2, 2001)
     slope = 2 * np.pi * STRIP / WAVE * np.cos(2 * np.pi * x / WAVE)
     e = np.concatenate(([0.0], np.cumsum(1 - np.hypot(1, slope))[:-1])) * (x[1] - x[0])
@@ -70,7 +70,7 @@ def figure_11_4(short: bool) -> Picture:
 
 
 def figure_11_5(short: bool) -> Picture:
-    """Capstan, bearing and coupling in their worst and best phases."""
+    """Errors of capstan, bearing and coupling in worst and best phases."""
     figure, axes = fig.panels(1, 2)
     said = []
     cases = (("worst phases", (np.pi, np.pi, 0.0)), ("best phases", (np.pi, 0.0, 0.0)))
@@ -90,7 +90,7 @@ def figure_11_5(short: bool) -> Picture:
 
 
 def figure_11_6(short: bool) -> Picture:
-    """Position error over 600 mm, with and without its trend."""
+    """Position error over 600 mm, with and without trend."""
     one, (found, _) = ch.printer(ch.SPEEDS[0]), ch.analysed(ch.SPEEDS[0])
     figure, (above, below) = fig.panels(2, sharex=True)
     fig.line(above, 1e3 * one.x, 1e3 * one.e)
@@ -106,7 +106,7 @@ def figure_11_6(short: bool) -> Picture:
 
 
 def two_scales(axes: Sequence[Any], wavelength: np.ndarray, size: np.ndarray, label: str) -> None:
-    """A spectrum, sizes (n,) over wavelengths (n,) in m, up to 600 mm and up to 40 mm in two axes."""
+    """Draw a spectrum, `size` (n,) over wavelengths (n,) in m, up to 600 mm and up to 40 mm in two axes."""
     for one, longest in zip(axes, (600, 40), strict=True):
         one.plot(1e3 * wavelength, size, ".-", color=fig.BLUE, linewidth=0.9, markersize=3)
         inside = wavelength <= 1e-3 * longest
@@ -173,7 +173,7 @@ def figure_11_10(short: bool) -> Picture:
 
 
 def _smooth(e: np.ndarray) -> np.ndarray:
-    """Without the edges of scale and encoder: the first three waves of a turn."""
+    """Error (n,) without quantisation steps: the first three harmonics of a turn."""
     line = np.linspace(e[0], e[-1], len(e))
     spectrum_of = np.fft.rfft(e - line)
     spectrum_of[19:] = 0.0  # the pass has six turns

@@ -1,4 +1,4 @@
-"""Figures of chapter 12, and its parts."""
+"""Figures and parts of chapter 12."""
 
 from typing import Any
 
@@ -13,7 +13,7 @@ from rtctl.reproduce import heads12, stroke12
 from rtctl.reproduce.played import config
 from rtctl.reproduce.rows import Part, Picture
 
-QUICK = (2 * np.pi * 1e5, 0.7)  # rad/s and damping of an amplifier that does not show
+QUICK = (2 * np.pi * 1e5, 0.7)  # rad/s and damping of an amplifier without visible effect
 UNDAMPED = {"b_s": 0.0, "b_c": 0.0, "B_c": 0.0, "B_m": 0.0, "K_m2": 0.0}
 
 
@@ -65,7 +65,7 @@ def figure_12_3(short: bool) -> Picture:
 
 
 def figure_12_4(short: bool) -> Picture:
-    """The signals of the sensitivity measurement, at the points of the block diagram."""
+    """Signals of the sensitivity measurement at the points of the block diagram."""
     record = ch.noise()[0][0]
     t = record.t - record.t[0]
     span = (t > 2.0) & (t < 2.05)
@@ -162,7 +162,7 @@ def figure_12_9(short: bool) -> Picture:
 
 
 def _loop(made: Any, which: str) -> Any:
-    """Controller, loop, closed loop and sensitivity, measured and of the model."""
+    """Figure of controller, loop, closed loop and sensitivity, measured and by the model."""
     got = ch.running(which)
     f = np.geomspace(1.0, 400.0, 600)
     L = response.loop(made, f)

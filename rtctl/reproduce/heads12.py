@@ -1,4 +1,4 @@
-"""Chapter 12 with print heads: figures 12.5, 12.8 and 12.9 on a linear drive that has the resonances of the text."""
+"""Chapter 12 with print heads: figures 12.5, 12.8 and 12.9 on a linear drive with the resonances of the thesis."""
 
 from functools import cache
 from typing import Any
@@ -14,8 +14,8 @@ from rtctl.reproduce import figures as fig
 from rtctl.reproduce.played import config
 from rtctl.reproduce.rows import Part, Picture, Row, under
 
-BAND = (50.0, 220.0)  # Hz, in which the text sees them
-STANDS = 1.0  # dB by which a peak of the response stands out of what is on both its sides
+BAND = (50.0, 220.0)  # Hz, range of the resonances in the thesis
+STANDS = 1.0  # dB, least prominence of a peak of the response on both sides
 CHOSEN = "frequencies, masses and damping of four print heads; the text has none"
 SET = "figure_12_2, the print heads of ldu_printer"
 SEVERAL = "From 50 to 220 [Hz] the FRF shows several damped resonances"
@@ -51,28 +51,28 @@ HEADS = under(
 
 @cache
 def machine() -> Any:
-    """The linear drive with the print heads of the printer, and nothing else of its errors."""
+    """Config of the linear drive with the printer's print heads, without its other errors."""
     heads = [entry.model_dump() for entry in config("ldu_printer").plant.physics if entry.term == "structure.resonance"]
     return config("ldu", {"plant.physics": heads})
 
 
 @cache
 def response_of() -> best_linear.BestLinear:
-    """Best linear approximation of its response."""
+    """Best linear approximation of the linear drive with print heads."""
     played = experiment.multisine(machine(), realisations=2, periods=2)
     return best_linear.identify([take(fused.run(one.config, one.seconds)) for one in played])
 
 
 @cache
 def shaped() -> shaping.Shaped:
-    """Filters by optimisation on that response."""
+    """Optimised filters for the response with print heads."""
     frf = response_of().frf
     return shaping.of_points(frf.f, frf.H, frf.dt, None)
 
 
 @cache
 def running(which: str) -> check.Measured:
-    """Loop gain while it runs: `present`, `kept` (filters made without the heads) or `made` (with them)."""
+    """Measured loop gain: `present`, `kept` (filters designed without the heads) or `made` (designed with them)."""
     made = machine()
     if which != "present":
         made = shaping.applied(made, (ch.shaped() if which == "kept" else shaped()).law)
@@ -80,7 +80,7 @@ def running(which: str) -> check.Measured:
 
 
 def peaks(f: np.ndarray, H: np.ndarray) -> list[float]:
-    """Frequencies in Hz in `BAND` at which |H| f^2 stands out, as a resonance beside the mass of the drive."""
+    """Frequencies in Hz of the peaks of |H| f^2 in `BAND`: resonances above the mass line of the drive."""
     from scipy.signal import find_peaks
 
     inside = (f >= BAND[0]) & (f <= BAND[1])
@@ -91,7 +91,7 @@ def peaks(f: np.ndarray, H: np.ndarray) -> list[float]:
 
 
 def with_heads(short: bool) -> dict[str, float]:
-    """What holds on the machine with the heads."""
+    """Rows of the machine with print heads."""
     best, present, kept = (
         response_of(), running("present").margins, running("kept").margins
     )  # fmt: skip
@@ -109,7 +109,7 @@ def with_heads(short: bool) -> dict[str, float]:
 
 
 def figure_12_11(short: bool) -> Picture:
-    """Response, and the loops, with the heads and without."""
+    """Figure of response and loops with and without print heads."""
     figure, (H, opened, closed, S) = fig.panels(2, 2)
     for best, color, words in ((ch.response_of(), fig.GREY, "without"), (response_of(), fig.BLUE, "with heads")):
         H.semilogx(best.f, fig.db(best.G * best.f**2), color=color, linewidth=0.9, label=words)

@@ -1,4 +1,4 @@
-"""Chapter 9 and appendix E: the motors of the reel unit, what a move asks of them, and a brushless one beside."""
+"""Chapter 9 and appendix E: motors of the reel unit, requirements of moves, and comparison with a brushless motor."""
 
 import math
 
@@ -11,9 +11,9 @@ from rtctl.reproduce.rows import Part, Picture, Row, under
 
 GEARED = APPENDIX_E[1]  # 150.4:1
 SMALL, LARGE = 0.020, 0.040  # m
-PAPER = 0.5 * math.pi * 1700.0 * 0.037 * (LARGE**4 - SMALL**4)  # kg m^2, of one full reel
+PAPER = 0.5 * math.pi * 1700.0 * 0.037 * (LARGE**4 - SMALL**4)  # kg m^2, paper of one full reel
 MOVES = {"0.2 m at 0.02 m/s": (0.2, 10.0), "0.2 m in 2 s": (0.2, 2.0), "12.5 mm in 1 s": (0.0125, 1.0)}
-LIMIT = 1.0  # N, tension at which a motor should turn back; ten times F_t
+LIMIT = 1.0  # N, tension at which a motor should yield; ten times F_t
 OTHER = "It is also recommended to use other DC motors"
 SAME = "Brushless DC motors are able to deliver the same continuous torque using a smaller transmission ratio"
 LINE = "9904 120 537..	24	58	3550	23	61"
@@ -50,7 +50,7 @@ MOTORS = under(
 
 
 def asked() -> dict[str, tuple[Move, float]]:
-    """Moves at the radius where each asks for the most: small for speed, large for torque; both for every move."""
+    """Moves at the two worst radii: the small radius for speed, the large radius for torque."""
     found = {}
     for words, (distance, seconds) in MOVES.items():
         for R in (SMALL, LARGE):
@@ -59,18 +59,18 @@ def asked() -> dict[str, tuple[Move, float]]:
 
 
 def fits(motor: Motor) -> dict[str, Fit]:
-    """A motor against every move."""
+    """Fit of a motor to every move."""
     return {words: motors.fit(motor, move, R, PAPER) for words, (move, R) in asked().items()}
 
 
 def good(motor: Motor) -> int:
-    """Number of moves that a motor does at every radius."""
+    """Number of moves that a motor can do at every radius."""
     found = fits(motor)
     return sum(all(one.good for name, one in found.items() if name.startswith(words)) for words in MOVES)
 
 
 def selection(short: bool) -> dict[str, float]:
-    """Motors of appendix E and a brushless one."""
+    """Rows of the motors of appendix E and of a brushless motor."""
     quick, _ = asked()["0.2 m in 2 s, R = 20 mm"]
     return {
         "9.most_current": BARE.volts / BARE.resistance,
@@ -86,7 +86,7 @@ def selection(short: bool) -> dict[str, float]:
 
 
 def figure_9_2(short: bool) -> Picture:
-    """Torque over speed of each motor, the moves, and the table of selection."""
+    """Figure of torque over speed of each motor, the moves, and the selection table."""
     figure, (axes, table) = fig.panels(1, 2, height=3.4)
     every = (*APPENDIX_E, BARE, BRUSHLESS)
     colors = (fig.BLUE, fig.ORANGE, "#4aa3a0", fig.RED, fig.GREY, fig.INK, "#8a4f9e")

@@ -1,4 +1,4 @@
-"""The shipped machines, changed and played on virtual time, for all chapters."""
+"""Runs of the shipped machines on virtual time with changed settings, for all chapters."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -13,7 +13,7 @@ from rtctl.loop.fused import Run, run
 
 
 def config(name: str, changes: Mapping[str, Any] | None = None) -> Any:
-    """A shipped config in fused mode, with other values at dotted keys. Raises UserError for a wrong key."""
+    """Shipped config in fused mode with `changes` at dotted keys. Raises UserError for an unknown key."""
     file = find(name)
     model = machines.class_of(load_yaml(file).data)
     assert model is not None, name
@@ -22,14 +22,14 @@ def config(name: str, changes: Mapping[str, Any] | None = None) -> Any:
 
 
 def reels(R1: float, R2: float, changes: Mapping[str, Any] | None = None) -> Any:
-    """The reel unit with reels of these radii (m), for its laws and for its emulator, and other values at keys."""
+    """Config of the reel unit with reel radii in m for law and emulator, and `changes` at dotted keys."""
     radii = {"R1": R1, "R2": R2}
     keys = {f"{place}.{name}": R for place in ("radius", "plant.parameters") for name, R in radii.items()}
     return config("ivu", {**(changes or {}), **keys})
 
 
 def play(made: Any, seconds: float) -> Run:
-    """A run of a config from the first tick on. Raises NoAnswer where the machine trips."""
+    """Run of a config from the first tick. Raises NoAnswer where the machine trips."""
     done = run(made, seconds)
     if done.tripped:
         raise NoAnswer(f"{made.name}: the run tripped, {done.tripped} at {done.trip_time:.3f} s")
@@ -37,9 +37,9 @@ def play(made: Any, seconds: float) -> Run:
 
 
 def crossover(f: np.ndarray, S: np.ndarray) -> float:
-    """Frequency in Hz at which the loop gain 1/S - 1 of a sensitivity (n,), measured at `f` (n,) Hz, falls through 1.
+    """Crossover frequency in Hz: the loop gain 1/S - 1 of a sensitivity (n,) at `f` (n,) in Hz falls through 1.
 
-    Between the lines it is interpolated in the logarithm. Raises NoAnswer where it does not.
+    Interpolates in the logarithm between lines. Raises NoAnswer without a crossover.
     """
     size = np.log(np.abs(1 / S - 1))
     falls = np.flatnonzero((size[:-1] >= 0) & (size[1:] < 0))

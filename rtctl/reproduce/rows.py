@@ -1,10 +1,10 @@
-"""A row: one number of the thesis beside the number that our own machines give, and whether they agree.
+"""Row: comparison of a number of the thesis with the number measured on the emulated machines.
 
-    Part            rows and figures that come out of the same runs
+    Part            rows and figures from common runs
     part.play(short) -> {name: measured}          computed, in the unit of the row
 
-What a row says of the thesis (number, source, quote, tolerance) is typed in; what is measured is always computed. Law,
-parameter set and filter say what it was computed with.
+The thesis side of a row (number, source, quote, tolerance) is typed in. The measured number is always computed. Law,
+parameter set and filter name the conditions of the computation.
 """
 
 import math
@@ -15,32 +15,32 @@ from rtctl.config.errors import NoAnswer
 
 Bound = Literal["within", "at least", "at most"]
 Verdict = Literal["pass", "chosen", "erratum", "differs", "fail"]
-NONE = "none"  # law, parameter set or filter of a row that is algebra
+NONE = "none"  # law, parameter set or filter of an algebraic row
 
 
 class Row(NamedTuple):
-    """A number of the thesis, and once it is measured the number beside it."""
+    """Number of the thesis and, once measured, the number of the emulated machine."""
 
     name: str
-    quantity: str  # what it is, in words
-    source: str  # section of the thesis where the quote stands, then equation or figure
-    thesis: float | None  # as it is printed; None where the text makes a claim without a number
+    quantity: str  # name of the quantity
+    source: str  # section of the quote in the thesis, then equation or figure
+    thesis: float | None  # printed number; None for a claim without a number
     unit: str
-    tolerance: float = 0.0  # share of the number where `relative`, else in its unit
+    tolerance: float = 0.0  # relative where `relative`, else in the unit of the number
     relative: bool = True
     bound: Bound = "within"
-    quote: str = ""  # words of the thesis with the number or the claim, to the letter
-    law: str = ""  # controller that was played or computed
+    quote: str = ""  # verbatim words of the thesis with the number or the claim
+    law: str = ""  # controller that was run or computed
     set: str = ""  # parameters of the plant, with each substitution
     filter: str = ""  # on the derivative or the velocity
-    erratum: str = ""  # what is wrong in the thesis; "" where nothing is
-    differs: str = ""  # why the emulated machine misses the tolerance; "" where it keeps it
-    chosen: str = ""  # inputs that are not of the thesis and were chosen so that the row passes
-    expected: float | None = None  # what the measured one is held against where that is not what is printed: the number
-    #                                of the equations behind an erratum, or of a claim
-    remark: str = ""  # why the tolerance is wide, or what else was chosen here
+    erratum: str = ""  # error in the thesis; "" without one
+    differs: str = ""  # reason why the emulated machine misses the tolerance; "" within it
+    chosen: str = ""  # inputs missing in the thesis, chosen to pass
+    expected: float | None = None  # number for the comparison where it is not the printed number: the result of the
+    #                                equations behind an erratum, or the number of a claim
+    remark: str = ""  # reason for a wide tolerance, or other choices
     measured: float = math.nan
-    refused: str = ""  # why nothing was measured
+    refused: str = ""  # reason for a missing measurement
 
     @property
     def chapter(self) -> int:
@@ -49,7 +49,7 @@ class Row(NamedTuple):
 
     @property
     def against(self) -> float:
-        """Number that the measured one is held against."""
+        """Number for the comparison with the measured number."""
         value = self.thesis if self.expected is None else self.expected
         assert value is not None, self.name
         return value
@@ -61,7 +61,7 @@ class Row(NamedTuple):
 
     @property
     def passes(self) -> bool:
-        """Whether the measured number is within the tolerance of the number it is held against; nan never is."""
+        """Whether the measured number is within the tolerance of `against`; nan never is."""
         off = self.measured - self.against
         if self.bound == "at least":
             return bool(off >= -self.margin)
@@ -71,13 +71,13 @@ class Row(NamedTuple):
 
     @property
     def verdict(self) -> Verdict:
-        """pass; chosen, erratum or differs where the row says so; fail where it does not do what it says."""
+        """Verdict: pass; chosen, erratum or differs where the row declares it; fail where that does not hold."""
         if not math.isfinite(self.measured) or self.passes == bool(self.differs):
             return "fail"
         return "differs" if self.differs else "erratum" if self.erratum else "chosen" if self.chosen else "pass"
 
     def as_json(self) -> dict[str, Any]:
-        """The row for a program. `pass` is |measured - against| <= tolerance, one-sided where `bound` says so."""
+        """Row as a JSON object. `pass` is |measured - against| <= tolerance, one-sided where `bound` is set."""
         return {
             "name": self.name,
             "quantity": self.quantity,
@@ -102,12 +102,12 @@ class Row(NamedTuple):
 
 
 def under(*rows: Row, law: str = NONE, set: str = NONE, filter: str = NONE) -> tuple[Row, ...]:
-    """Rows with the law, parameter set and filter of their group, where a row does not name its own."""
+    """Rows with the law, parameter set and filter of their group where a row has none."""
     return tuple(r._replace(law=r.law or law, set=r.set or set, filter=r.filter or filter) for r in rows)
 
 
 class Picture(NamedTuple):
-    """A figure of the thesis drawn from our own data."""
+    """Figure of the thesis, drawn from data of the emulated machines."""
 
     number: str  # 8.3
     sentence: str
@@ -115,7 +115,7 @@ class Picture(NamedTuple):
 
 
 class Part(NamedTuple):
-    """Rows and figures that come out of the same runs; `short` makes the runs shorter."""
+    """Rows and figures from common runs; `short` makes the runs shorter."""
 
     title: str
     rows: tuple[Row, ...]
@@ -124,12 +124,12 @@ class Part(NamedTuple):
 
     @property
     def chapter(self) -> int:
-        """Chapter of its rows."""
+        """Chapter of the rows."""
         return self.rows[0].chapter
 
 
 def measured(part: Part, short: bool) -> list[Row]:
-    """The rows of a part with their measured numbers. Where an experiment gives no answer they say why and fail."""
+    """Rows of a part with measured numbers. Rows of a failed experiment hold the reason and fail."""
     try:
         values = part.play(short)
     except NoAnswer as error:

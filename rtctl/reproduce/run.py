@@ -1,4 +1,4 @@
-"""All parts of all chapters, side by side in processes, with a word after each."""
+"""Run of all parts of all chapters in parallel processes, with a progress line for each."""
 
 import importlib
 import time
@@ -12,23 +12,23 @@ from rtctl.config.errors import NoAnswer, UserError, nearest
 from rtctl.config.files import made_in
 from rtctl.reproduce.rows import Part, Row, measured
 
-MODULES = {  # module that holds the parts of a chapter
+MODULES = {  # chapter -> modules with its parts
     3: "chapter03", 4: "chapter04", 5: "chapter05", 6: "chapter06", 7: "chapter07", 8: "figures08", 9: "chapter09",
     10: "chapter10", 11: "figures11", 12: "figures12",
 }  # fmt: skip
-FOLDER = "images/reproduction"  # of the figures, beside the page
+FOLDER = "images/reproduction"  # folder of the figures, beside the page
 
 
 class Drawn(NamedTuple):
-    """A figure that was saved."""
+    """Saved figure."""
 
     number: str
     sentence: str
-    file: str  # its name
+    file: str  # file name
 
 
 class Result(NamedTuple):
-    """What came out of a part."""
+    """Result of a part."""
 
     chapter: int
     title: str
@@ -38,9 +38,9 @@ class Result(NamedTuple):
 
 
 def parts(only: str | None = None) -> list[Part]:
-    """The parts of all chapters; with `only` those of a chapter (8), a row (8.delay, delay) or a figure (8.3).
+    """Parts of all chapters; with `only` those of a chapter (8), a row (8.delay, delay) or a figure (8.3).
 
-    Raises UserError where nothing is called that.
+    Raises UserError where `only` matches nothing.
     """
     chapters = [int(only)] if only and only.isdigit() and int(only) in MODULES else list(MODULES)
     every = [
@@ -64,9 +64,9 @@ def parts(only: str | None = None) -> list[Part]:
 def reproduce(
     which: Sequence[Part], short: bool, out: Path | None, jobs: int = 1, say: Callable[[str], None] | None = None
 ) -> list[Result]:
-    """Play parts and draw their figures into `out`/images/reproduction (None: no figures), `jobs` of them at once.
+    """Run parts and draw their figures into `out`/images/reproduction (None: no figures), `jobs` parts at a time.
 
-    `say` gets a line after each. Results come in the order of the parts.
+    `say` gets a line after each part. Results are in the order of the parts.
     """
     folder = None if out is None else made_in(out, *FOLDER.split("/"))
     done: dict[int, Result] = {}
@@ -85,14 +85,14 @@ def reproduce(
             try:
                 for future in as_completed(futures):
                     note(futures[future], future.result())
-            except BaseException:  # what has not begun yet would be played to its end
+            except BaseException:  # without cancellation, waiting parts would run to their end
                 pool.shutdown(wait=False, cancel_futures=True)
                 raise
     return [done[i] for i in range(len(which))]
 
 
 def play(part: Part, short: bool, folder: Path | None) -> Result:
-    """Rows and figures of a part. A figure whose experiment gives no answer is left out; its rows say why."""
+    """Rows and figures of a part. A failed experiment has no figure; its rows hold the reason."""
     begin = time.monotonic()
     rows, drawn = measured(part, short), []
     if folder is not None:
@@ -108,7 +108,7 @@ def play(part: Part, short: bool, folder: Path | None) -> Result:
 
 
 def _alone() -> None:
-    """One thread a process: there are as many processes as cores."""
+    """Limit this process to one thread: there are as many processes as cores."""
     from threadpoolctl import threadpool_limits
 
     threadpool_limits(1)

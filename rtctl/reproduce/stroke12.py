@@ -1,5 +1,7 @@
-"""Chapter 12, productivity: how long a printing step takes until the carriage is where it should be, and a stroke of
-them, with the present law and with the best one, at equal error."""
+"""Chapter 12, productivity: arrival time of a printing step and duration of a stroke, at equal error.
+
+Compares the present law with the best law.
+"""
 
 from functools import cache
 from typing import Any
@@ -14,11 +16,11 @@ from rtctl.reproduce import figures as fig
 from rtctl.reproduce.played import config
 from rtctl.reproduce.rows import Part, Picture, Row, under
 
-ERROR = 10e-6  # m, an eighth of a step: within it a step has arrived
+ERROR = 10e-6  # m, an eighth of a step: error at arrival
 STEP = 1e-3 / 12  # m
-COUNT, HOLD = 8, 0.5  # steps of a run, there and back, and s of each
-WIDTH = 0.6  # m, of a stroke
-SHAPERS = (60.0, 120.0, 180.0, 240.0)  # rad/s, each tried with each law
+COUNT, HOLD = 8, 0.5  # steps of a run, forward and back, and length of a step in s
+WIDTH = 0.6  # m, width of a stroke
+SHAPERS = (60.0, 120.0, 180.0, 240.0)  # rad/s, bandwidths tried with each law
 FASTER = "the speed of positioning must be increased without losing accuracy"
 BEST = "lead-lag, notch, low-pass, computed torque, friction in full"
 
@@ -42,7 +44,7 @@ STROKE = under(
 
 
 def made(law: str, bandwidth: float) -> Any:
-    """Config of printing steps with the present or the best law, shaped by `bandwidth` rad/s."""
+    """Config of printing steps with the present or the best law, with a shaper of `bandwidth` in rad/s."""
     one = config("ldu")
     if law == "best":
         one = shaping.applied(one, ch.shaped().law)
@@ -54,7 +56,7 @@ def made(law: str, bandwidth: float) -> Any:
 
 @cache
 def arrival(law: str, bandwidth: float) -> tuple[float, np.ndarray, np.ndarray]:
-    """Slowest time in s until a step stays within the error (inf where one does not), and time and error of the run."""
+    """Slowest arrival time of a step in s (inf where a step never arrives), and time and error of the run."""
     run = fused.run(made(law, bandwidth), 0.5 + HOLD * COUNT + 0.5)
     if run.tripped:
         return np.inf, np.zeros(2), np.zeros(2)
@@ -69,12 +71,12 @@ def arrival(law: str, bandwidth: float) -> tuple[float, np.ndarray, np.ndarray]:
 
 
 def quickest(law: str, short: bool) -> float:
-    """Shaper in rad/s with which the steps of a law arrive first."""
+    """Shaper bandwidth in rad/s with the shortest arrival time of a law."""
     return min(SHAPERS[2:] if short else SHAPERS, key=lambda bandwidth: arrival(law, bandwidth)[0])
 
 
 def productivity(short: bool) -> dict[str, float]:
-    """Steps and strokes with both laws."""
+    """Rows of steps and strokes with both laws."""
     present, best = (arrival(law, quickest(law, short))[0] for law in ("present", "best"))
     strokes = WIDTH / STEP / 60.0
     return {
@@ -86,7 +88,7 @@ def productivity(short: bool) -> dict[str, float]:
 
 
 def figure_12_12(short: bool) -> Picture:
-    """Error of the carriage over a step with both laws."""
+    """Figure of the carriage error over a step with both laws."""
     figure, (axes,) = fig.panels(1, height=2.4)
     axes.axhspan(-1e6 * ERROR, 1e6 * ERROR, color="#e9f0e6")
     words = []

@@ -1,1 +1,1 @@
-"""Bundles (recording.parquet and case.json), their repair, metrics and pictures."""
+"""Bundles (recording.parquet and case.json), their repair, metrics and plots."""

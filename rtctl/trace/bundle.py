@@ -1,9 +1,9 @@
-"""A bundle: a folder with `recording.parquet` (one row per tick) and `case.json` (what the owner believes).
+"""Bundle of a recording: a folder with `recording.parquet` (rows) and `case.json` (settings, nominal model).
 
-While a recording runs, the folder holds `recording.arrows` instead; `finish` makes the one from the other. At every
-moment in between the folder holds all the data in a form that `rtctl.trace.repair` understands.
+While a recording runs, the folder holds `recording.arrows`, which `finish` converts to `recording.parquet`.
+At every moment of the conversion, `rtctl.trace.repair` can rebuild the bundle from the folder.
 
-A long recording is in parts: `part-0001`, `part-0002` and so on are bundles, and `case.json` beside them is of all.
+A long recording has parts, the bundles `part-0001`, `part-0002` and so on. `case.json` beside them describes all parts.
 """
 
 import json
@@ -28,22 +28,22 @@ ARROWS = "recording.arrows"
 PARQUET = "recording.parquet"
 CASE = "case.json"
 PART = "part-{:04d}"
-FORMAT = 1  # of our own recordings of machines known by name
+FORMAT = 1  # of case.json of a machine that rtctl knows by name
 FORMATS = (FORMAT, 2)
-ROW_GROUP = 65_536  # rows; what a conversion holds in memory
+ROW_GROUP = 65_536  # rows that a conversion holds in memory
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Bundle:
-    """A recording as it was loaded: `bundle["capstan"]` is a column (n,)."""
+    """Loaded recording: `bundle["capstan"]` is a column (n,)."""
 
     columns: dict[str, np.ndarray]
     case: dict[str, Any]
     folder: Path
-    units: dict[str, str]  # of the columns that name theirs
+    units: dict[str, str]  # column -> unit, of columns that have a unit
 
     def __getitem__(self, name: str) -> np.ndarray:
-        """A column (n,) by its name. Raises UserError where there is none."""
+        """Column (n,) by its name. Raises UserError where no column has this name."""
         return notebook.column(self, name)
 
     def __iter__(self) -> Iterator[str]:
@@ -61,24 +61,24 @@ class Bundle:
         return notebook.html(self)
 
     def __arrow_c_stream__(self, requested_schema: Any = None) -> Any:
-        """The columns as a stream of Arrow, for whatever reads one: `polars.from_arrow`, `duckdb`, `pyarrow.table`."""
+        """Arrow stream of the columns, for `polars.from_arrow`, `duckdb`, `pyarrow.table` and others."""
         return notebook.arrow(self).__arrow_c_stream__(requested_schema)
 
     def to_pandas(self) -> Any:
-        """A DataFrame by time, s; units in its `attrs`. Raises UserError without pandas."""
+        """DataFrame indexed by time in s; units in its `attrs`. Raises UserError without pandas."""
         return notebook.to_pandas(self)
 
     def to_xarray(self) -> Any:
-        """A Dataset along `t`, s, with units. Raises UserError without xarray."""
+        """Dataset along `t` in s, with units. Raises UserError without xarray."""
         return notebook.to_xarray(self)
 
     def plot(self, *columns: str) -> "Figure":
-        """A figure of some columns over the time, or of the known ones. Raises UserError where one is not there."""
+        """Figure of `columns` over time; of all known columns by default. Raises UserError for a missing column."""
         return notebook.plot(self, columns)
 
 
 def load_bundle(folder: Path | str) -> Bundle:
-    """Read a finished bundle, all parts as one. Raises UserError that names the file and says what would be right."""
+    """Load a finished bundle, all parts as one. Raises UserError that names the file and the remedy."""
     folder = Path(folder)
     if not folder.is_dir():
         raise no_folder(folder)
@@ -90,7 +90,7 @@ def load_bundle(folder: Path | str) -> Bundle:
 
 
 def columns_of_table(path: Path, table: pa.Table) -> dict[str, np.ndarray]:
-    """Columns (n,) by name of rows that were read of the file `path`. Raises UserError where they are no recording."""
+    """Columns (n,) by name of a table read from `path`. Raises UserError where the table is no recording."""
     columns = {name: _numbers(path, name, table.column(name)) for name in table.column_names}
     if "t" not in columns:
         hint = nearest("t", columns) or nearest("time", columns)
@@ -103,12 +103,12 @@ def columns_of_table(path: Path, table: pa.Table) -> dict[str, np.ndarray]:
 
 
 def units_of(schema: pa.Schema) -> dict[str, str]:
-    """Units of the columns that name theirs."""
+    """Units by column, of the columns that have a unit."""
     return {c.name: c.unit for c in columns_of(schema) if c.unit}
 
 
 def part_folders(folder: Path) -> list[Path]:
-    """The parts of a long recording, in order; none where it is in one piece."""
+    """Part folders of a long recording, in order; empty for a recording without parts."""
     found = [part for part in folder.glob("part-*") if part.is_dir() and part.name[5:].isdecimal()]
     for part in found:
         files.inside(part, folder)
@@ -116,7 +116,7 @@ def part_folders(folder: Path) -> list[Path]:
 
 
 def index(folder: Path) -> dict[str, Any]:
-    """What the case on top says of its parts: `parts`, each with its rows and its first and last `tick` and `t`."""
+    """Entry `parts` of the top case.json: for each part its rows and its first and last `tick` and `t` (s)."""
     return {"parts": [entry for part in part_folders(folder) if (entry := _entry(part)) is not None]}
 
 
@@ -125,7 +125,7 @@ def _entry(part: Path) -> dict[str, Any] | None:
     try:
         found = pq.read_metadata(part / PARQUET)
     except (pa.ArrowException, OSError):
-        return None  # not made yet, or damaged
+        return None  # not converted yet, or damaged
     entry: dict[str, Any] = {"folder": part.name, "rows": found.num_rows}
     groups = [found.row_group(g) for g in (0, found.num_row_groups - 1)] if found.num_row_groups else []
     for k, name in enumerate(found.schema.names):
@@ -136,7 +136,7 @@ def _entry(part: Path) -> dict[str, Any] | None:
 
 
 def recordings(folder: Path) -> list[Path]:
-    """The Parquet files of a finished bundle: its own, or those of its parts."""
+    """Parquet files of a finished bundle: its own file, or the files of its parts."""
     path = files.inside(folder / PARQUET, folder)
     if path.is_file():
         return [path]
@@ -149,20 +149,20 @@ def recordings(folder: Path) -> list[Path]:
     there = [part.name for part in parts if (part / PARQUET).is_file()]
     if not isinstance(told, list) or [e.get("folder") for e in told if isinstance(e, dict)] != there:
         raise UserError(
-            f"{folder / CASE} lists other parts than are there ({', '.join(there[:20]) or 'none'}); "
+            f"{folder / CASE} lists other parts than the folder holds ({', '.join(there[:20]) or 'none'}); "
             f"run: rtctl trace repair {folder}"
         )
     return [files.inside(folder / name / PARQUET, folder) for name in there]
 
 
 def _table(paths: list[Path]) -> pa.Table:
-    """The rows of all files, one after the other."""
+    """Table of the rows of all files, concatenated."""
     tables: list[pa.Table] = []
     for path in paths:
         try:
-            with pq.ParquetFile(path) as file:  # read_table would load datasets, and with them pandas: half a second
+            with pq.ParquetFile(path) as file:  # read_table would load datasets and pandas: 0.5 s
                 tables.append(file.read())
-            tables[-1].column_names  # noqa: B018  names that are no text are told only when asked for
+            tables[-1].column_names  # noqa: B018  Arrow decodes names, and fails, only on access
         except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
             raise UserError(f"{path} cannot be read as Parquet: {_first_line(error)}") from None
         if not tables[-1].schema.equals(tables[0].schema):
@@ -171,7 +171,7 @@ def _table(paths: list[Path]) -> pa.Table:
 
 
 def no_folder(folder: Path | str) -> UserError:
-    """What is said of a bundle that is not a folder."""
+    """UserError for a bundle that is not a folder."""
     return UserError(f"{folder} is not a folder; a bundle is a folder with {PARQUET} and {CASE}")
 
 
@@ -183,9 +183,9 @@ def load_case(folder: Path) -> dict[str, Any]:
     except FileNotFoundError:
         if not Path(folder).is_dir():
             raise no_folder(folder) from None
-        raise UserError(f"{path} is missing; it says what the owner believes of the machine") from None
+        raise UserError(f"{path} is missing; it holds the nominal model of the machine") from None
     except OSError as error:
-        raise UserError(f"{path} cannot be read: {error.strerror}") from error  # which may pass
+        raise UserError(f"{path} cannot be read: {error.strerror}") from error  # may be temporary
     except UnicodeDecodeError as error:
         raise UserError(f"{path} is not text in UTF-8: byte {error.start}") from None
     except json.JSONDecodeError as error:
@@ -200,21 +200,21 @@ def load_case(folder: Path) -> dict[str, Any]:
 
 
 def save_case(folder: Path, case: dict[str, Any]) -> Path:
-    """Write case.json: the old one or the new one is there at any moment, never half of either."""
+    """Write case.json atomically; returns its path."""
     path = Path(folder) / CASE
     files.write_text(path, as_json(case, indent=1) + "\n", sync=True)
     return path
 
 
 def as_json(case: dict[str, Any], indent: int | None = None) -> str:
-    """The case as text; numpy's numbers and arrays and paths are welcome. Raises ValueError at nan and inf."""
+    """JSON text of a case. Accepts numpy numbers, arrays and paths. Raises ValueError for nan and inf."""
     return json.dumps(case, indent=indent, default=_plain, allow_nan=False)
 
 
 def write_parquet(folder: Path, batches: Iterable[pa.RecordBatch], schema: pa.Schema, expect: int | None = None) -> int:
-    """Write recording.parquet in flat memory, verify it and put it in place; returns its rows.
+    """Write recording.parquet in constant memory, verify it and move it into place; returns its number of rows.
 
-    Raises OSError where the disk does not take it, or does not give back as many rows as it was given (or `expect`).
+    Raises OSError where the write fails, or where the file holds other than the written (or `expect`) number of rows.
     """
     rows = 0
     with files.replaced(folder / PARQUET, "wb", sync=True) as file:
@@ -246,7 +246,7 @@ def _groups(batches: Iterable[pa.RecordBatch], schema: pa.Schema) -> Iterable[pa
 def _numbers(path: Path, name: str, column: pa.ChunkedArray) -> np.ndarray:
     kind = column.type
     if column.null_count == len(column) > 0:
-        return np.full(len(column), np.nan)  # nobody knows it, such as the reference of a law that is not known
+        return np.full(len(column), np.nan)  # unknown column, such as the reference of an unknown law
     if not (pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_boolean(kind)):
         raise UserError(f"{path}: column '{name}' holds {kind}; it should hold numbers")
     if column.null_count:
@@ -257,8 +257,7 @@ def _numbers(path: Path, name: str, column: pa.ChunkedArray) -> np.ndarray:
 
 
 def _values(chunk: pa.Array) -> np.ndarray:
-    """Numbers of a column without empty cells, as they lie in memory. `to_numpy` would load pandas, where it is
-    installed, and take half a second for it."""
+    """Numbers of a column without empty cells, without a copy. `to_numpy` would import an installed pandas: 0.5 s."""
     data = chunk.buffers()[1]
     kind = _dtype(chunk.type)
     return np.frombuffer(data, kind)[chunk.offset : chunk.offset + len(chunk)] if data else np.empty(0, kind)
@@ -270,7 +269,7 @@ def _dtype(kind: pa.DataType) -> np.dtype:
 
 
 def _plain(value: Any) -> Any:
-    """numpy's numbers and arrays, and paths, as JSON knows them."""
+    """JSON value of a numpy number, a numpy array or a path."""
     if isinstance(value, np.generic | np.ndarray):
         return value.tolist()
     if isinstance(value, Path):

@@ -1,4 +1,4 @@
-"""Which rows to record: a stretch before and after the moment that matters."""
+"""Capture: selection of the rows before and after a trigger."""
 
 import math
 from collections import deque
@@ -11,9 +11,9 @@ from rtctl.trace.trigger import Trigger
 class Capture:
     """Passes on the rows from `pre_s` before the trigger to `duration_s` after it (s; inf for no end).
 
-    Without a trigger it starts at the first row. `rate` is ticks per second; time is counted in ticks, so that rows
-    that were lost on the way do not make a capture longer. Holds no more than `pre_s` of rows, rounded up to batches.
-    Raises ValueError for times that are not sensible.
+    Without a trigger the capture starts at the first row. `rate` is ticks per second. Time is counted in ticks: lost
+    rows do not make a capture longer. Holds at most `pre_s` of rows, rounded up to batches. Raises ValueError for
+    times or rates out of range.
     """
 
     def __init__(self, duration_s: float, pre_s: float, trigger: Trigger | None, rate: float):
@@ -26,11 +26,11 @@ class Capture:
         self._pre = round(pre_s * rate)  # ticks
         self._trigger = trigger
         self._before: deque[np.ndarray] = deque()
-        self.trigger_tick: int | None = None  # None until then
+        self.trigger_tick: int | None = None  # None before the trigger
         self.done = False
 
     def prime(self, rows: np.ndarray) -> None:
-        """Rows from before the capture was asked for: they can precede the trigger, never be it."""
+        """Take rows from before the request for the capture. They can precede the trigger but not fire it."""
         if not len(rows):
             return
         if self._trigger:
@@ -38,7 +38,7 @@ class Capture:
         self._hold(rows)
 
     def feed(self, rows: np.ndarray) -> tuple[np.ndarray, bool]:
-        """Rows to write out of the next batch (and of those held back), and whether the capture is complete."""
+        """Rows to write, of the next batch and of the rows held back, and whether the capture is complete."""
         if self.done or not len(rows):
             return rows[:0], self.done
         if self.trigger_tick is not None:

@@ -1,8 +1,8 @@
-"""Clock of a recording: an even one of a known rate, by one rule for import and for diagnosis.
+"""Clock of a recording: equidistant times of a known rate, by one rule for import and for diagnosis.
 
-A time column with few digits is a staircase below an even clock: 10000 rows a second with three decimals repeat each
-time ten times. Such a column is recognised by its step, two neighbouring multiples of the last digit, and by its
-distance from an even clock, less than one digit everywhere. Its rows are laid on the even clock.
+A time column with few digits is a staircase below an even clock: at 10000 rows a second, three decimals repeat each
+time ten times. Two properties identify a staircase: its steps are two neighbouring multiples of the last digit, and it
+stays within one digit of an even clock. The rows of a staircase are laid on the even clock.
 """
 
 from collections.abc import Callable
@@ -12,29 +12,29 @@ import numpy as np
 
 from rtctl.config.errors import UserError
 
-UNEVEN = 0.5  # of the usual step: largest deviation of a step of an even clock
-RATE_OFF = 0.01  # share by which a clock may differ from the rate that is told
-RATE_NOTED = 1e-3  # share from which the difference is noted
-COARSE = 0.01  # of the usual step: least digit that counts as coarse
-STAIRS = 8  # irregular steps that are evidence for a staircase where no rate is told
-FITTED = 0.01  # of a digit: how far a fitted rate may lead beyond it
-ROUNDING = 1e-6  # share of a step within which two steps are one
+UNEVEN = 0.5  # share of the usual step: largest deviation of one step of an even clock
+RATE_OFF = 0.01  # share by which a clock may differ from the given rate
+RATE_NOTED = 1e-3  # share from which a note reports the difference
+COARSE = 0.01  # share of the usual step: smallest digit that counts as coarse
+STAIRS = 8  # irregular steps that show a staircase without a given rate
+FITTED = 0.01  # share of a digit: tolerance of the staircase around a fitted rate
+ROUNDING = 1e-6  # share of a step within which two steps count as equal
 
 
 class Clock(NamedTuple):
     t: np.ndarray  # (n,) s; as recorded, or laid on the even clock where its digits are coarse
     rate: float  # Hz
-    note: str  # sentence for people where the column was not taken as it is; else empty
+    note: str  # sentence for the user where the column was changed or its rate differs; else empty
 
 
 def even_rows(
     t: np.ndarray, rate: float | None, row: Callable[[int], str], told: str = "--rate says {:g}", gaps: bool = False
 ) -> Clock:
-    """Clock of the times `t` (n,) in s, n >= 2, finite; `rate` in Hz where it is told.
+    """Clock of the times `t` (n,) in s, n >= 2, finite; `rate` in Hz where it is given.
 
-    `row(k)` says file, column and row k; `told` says where the rate, `{:g}`, comes from. With `gaps` steps that are too
-    long stay as they are. Raises UserError that names the row where time does not increase, where a step is missing, or
-    where the rate is another than the one told.
+    `row(k)` names file, column and row k. `told` names the source of the rate `{:g}`. With `gaps`, long steps stay as
+    they are. Raises UserError that names the row where time does not increase or a step is missing, and UserError
+    where the column has another rate than `rate`.
     """
     stairs = _staircase(t, rate)
     if stairs is not None:
@@ -53,8 +53,8 @@ def even_rows(
         k = int(off[0]) + 1
         more = f", as at {len(off) - 1} more places" if len(off) > 1 else ""
         raise UserError(
-            f"{row(k)}: {d[k - 1]:.6g} s after the row before where {usual:.6g} s is usual{more}; --uneven keeps such "
-            "a clock, else lay the rows on an even one first"
+            f"{row(k)}: {d[k - 1]:.6g} s after the row before where {usual:.6g} s is usual{more}; keep an uneven "
+            "clock with --uneven, or resample the rows to an even clock first"
         )
     found = 1.0 / usual
     _agree(found, rate, row, told)
@@ -62,25 +62,25 @@ def even_rows(
 
 
 def increasing(t: np.ndarray, row: Callable[[int], str], hint: bool = False) -> None:
-    """Raise UserError that names the first row that is not later than the row before; `hint` at --rate."""
+    """Raise UserError that names the first row not later than the row before; with `hint` it mentions --rate."""
     back = np.flatnonzero(np.diff(t) <= 0)
     if not len(back):
         return
     k = int(back[0]) + 1
     more = f" (also at {len(back) - 1} more rows)" if len(back) > 1 else ""
-    ways = "; if its digits are too few for its rows, --rate says how many rows a second there are" if hint else ""
+    ways = "; where its digits are too few, give the rows a second with --rate" if hint else ""
     raise UserError(f"{row(k)}: {t[k]:.9g} s after {t[k - 1]:.9g} s{more}; time should increase{ways}")
 
 
 def usual_step(d: np.ndarray) -> float:
-    """Mean of the steps `d` (n,) s that lie around their median; longer ones are gaps."""
+    """Mean step in s, of the steps `d` (n,) in s near their median; longer steps are gaps."""
     median = float(np.median(d))
     near = d[np.abs(d - median) <= UNEVEN * median]
     return float(np.mean(near))
 
 
 def _staircase(t: np.ndarray, rate: float | None) -> tuple[float, float, float] | None:
-    """Start in s, rate in Hz and digit in s of the even clock above a staircase; None where `t` is none."""
+    """Start in s, rate in Hz and digit in s of the even clock above a staircase; None where `t` is no staircase."""
     n = len(t)
     d = np.diff(t)
     mean = float(t[-1] - t[0]) / (n - 1)
@@ -90,14 +90,14 @@ def _staircase(t: np.ndarray, rate: float | None) -> tuple[float, float, float] 
     if digit < COARSE * mean:
         return None
     k = np.arange(n, dtype=float)
-    # ties of round-half-even reach a whole digit, and so does one lost row
+    # rounding half to even deviates by a whole digit; one lost row does too
     slopes = [(1.0 / rate, 1.0 + (ROUNDING if irregular >= STAIRS else -ROUNDING))] if rate is not None else []
     if irregular >= STAIRS:
         slopes.append((float(np.polyfit(k, t - t[0], 1)[0]), 1.0 + FITTED))
     for slope, share in slopes:
         if not _within(t, slope, digit * share):
             continue
-        if rate is None:  # the shortest number that explains each step
+        if rate is None:  # prefer the rate with the fewest digits that explains each step
             short = (1.0 / float(f"{1.0 / slope:.{digits}g}") for digits in range(2, 7))
             slope = next((s for s in short if _within(t, s, digit * (1.0 + ROUNDING))), slope)
         left = t - slope * k
@@ -112,7 +112,7 @@ def _within(t: np.ndarray, slope: float, digit: float) -> bool:
 
 
 def _refuse_break(t: np.ndarray, rate: float, row: Callable[[int], str]) -> None:
-    """Raise UserError at the first row where a staircase of few digits leaves the clock that is told."""
+    """Raise UserError at the first row where a staircase of few digits leaves the clock of the given rate."""
     d = np.diff(t)
     digit = float(d[d > 0].min()) if (d > 0).any() else 0.0
     if (d < 0).any() or not digit or np.abs(t / digit - np.round(t / digit)).max() > 1e-3:
@@ -124,12 +124,12 @@ def _refuse_break(t: np.ndarray, rate: float, row: Callable[[int], str]) -> None
         k = int(off[0])
         raise UserError(
             f"{row(k)}: {t[k]:.9g} s is more than the last digit ({digit:.3g} s) off an even clock of {rate:g} Hz, "
-            "which holds up to there: rows are missing or doubled; lay the rows on an even clock first"
+            "which holds up to there: rows are missing or doubled; repair the rows first"
         )
 
 
 def _digit(t: np.ndarray, d: np.ndarray, mean: float) -> tuple[float, int]:
-    """Step of the last digit in s and how many rows show it; 0 where the column has all digits that it needs."""
+    """Step of the last digit in s and number of rows that show it; 0 where the column has enough digits."""
     low, high = float(d.min()), float(d.max())
     rounding = max(ROUNDING * mean, 4.0 * float(np.spacing(np.abs(t).max())))
     if low < -rounding or high - low <= rounding:
@@ -140,7 +140,7 @@ def _digit(t: np.ndarray, d: np.ndarray, mean: float) -> tuple[float, int]:
         return digit, int(min(at_low.sum(), at_high.sum()))
     with np.errstate(over="ignore"):
         single = t.astype(np.float32)
-    if np.array_equal(single.astype(float), t):  # numbers of seven digits
+    if np.array_equal(single.astype(float), t):  # float32 times
         return float(np.spacing(np.abs(single).max())), len(d)
     return 0.0, 0
 
@@ -158,6 +158,6 @@ def _off(found: float, rate: float | None, told: str) -> str:
 
 
 def _tidy(rate: float) -> float:
-    """1000 and not 999.99998: a millionth is less than any clock here is good for."""
+    """Rate in Hz rounded to five digits where this changes less than 1e-6, the accuracy of any clock here."""
     short = float(f"{rate:.5g}")
     return short if abs(short / rate - 1) < 1e-6 else rate

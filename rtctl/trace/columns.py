@@ -1,4 +1,4 @@
-"""What a recorded column is called, in what unit, and what it means; kept in the file itself."""
+"""Arrow schema of recorded columns: name, unit and meaning, stored in the file."""
 
 from collections.abc import Mapping, Sequence
 
@@ -13,8 +13,8 @@ __all__ = ["Column", "columns_of", "record_batch", "schema"]
 def schema(columns: Sequence[Column], dtype: np.dtype, metadata: Mapping[str, str] | None = None) -> pa.Schema:
     """The schema of a recording: one field for each of `columns`, typed as in `dtype`, unit and help in its metadata.
 
-    Fields of `dtype` that are not among `columns` are not recorded. Raises ValueError where a column is not in `dtype`,
-    is there twice, or is not a scalar.
+    Fields of `dtype` that are not among `columns` are not recorded. Raises ValueError where a column is missing in
+    `dtype`, is named twice, or is not a scalar.
     """
     names = [column.name for column in columns]
     twice = sorted({name for name in names if names.count(name) > 1})
@@ -36,21 +36,20 @@ def _field(column: Column, dtype: np.dtype) -> pa.Field:
 
 
 def record_batch(rows: np.ndarray, schema: pa.Schema) -> pa.RecordBatch:
-    """The rows (structured array) as columns. Copies."""
+    """Record batch of rows (structured array). Copies."""
     return pa.record_batch([_array(rows[field.name], field.type) for field in schema], schema=schema)
 
 
 def _array(values: np.ndarray, kind: pa.DataType) -> pa.Array:
-    """The values as they lie in memory. `pa.array` would load pandas, where it is installed, to ask whether they are
-    a categorical: half a second at the start of every recording."""
+    """Arrow array of values. `pa.array` would import an installed pandas: 0.5 s at the start of every recording."""
     values = np.ascontiguousarray(values)
-    if pa.types.is_boolean(kind):  # eight of them a byte
+    if pa.types.is_boolean(kind):  # Arrow packs eight booleans into a byte
         return pa.array(values)
     return pa.Array.from_buffers(kind, len(values), [None, pa.py_buffer(values)])
 
 
 def columns_of(schema: pa.Schema) -> list[Column]:
-    """The way back: unit and help are empty where a file from elsewhere does not name them."""
+    """Columns of an Arrow schema; unit and help are empty where the file has none."""
     return [Column(field.name, _text(field, b"unit"), _text(field, b"help")) for field in schema]
 
 

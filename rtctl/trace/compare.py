@@ -1,7 +1,6 @@
-"""Two recordings of the same machine, tick beside tick: where each signal first differs, by how much, and the steps.
+"""Comparison of two recordings of the same machine: first and largest difference of each signal, and the steps.
 
-They are laid upon each other where their reference starts to move, or by the numbers of their ticks. Both are read
-into memory.
+The recordings are aligned at the first move of the reference, or by tick numbers. Both are read into memory.
 """
 
 from collections.abc import Sequence
@@ -15,24 +14,24 @@ from rtctl.trace.bundle import PARQUET, Bundle, load_bundle
 from rtctl.trace.metrics import scales, settle_floor, step_metrics
 
 Align = Literal["auto", "tick", "reference"]
-REFERENCES = ("target", "ref")  # before shaping, if it is there: it moves at once
-MEASURED = ("capstan", "position", "x", "feedback")  # in the order in which they are looked for
-MOVES = 0.01  # share of the reference's span that counts as a start
+REFERENCES = ("target", "ref")  # `target` first: it is the reference before shaping and moves without delay
+MEASURED = ("capstan", "position", "x", "feedback")  # in order of search
+MOVES = 0.01  # share of the reference's span that counts as its first move
 RATE_OFF = 1e-3  # share by which the rates may differ
 RUNNING = 2  # in the column `state`
 
 
 class SignalDifference(NamedTuple):
-    """B - A of one column over the common ticks; numbers in the column's unit, nan where nothing can be said."""
+    """B - A of one column over the common ticks, in the column's unit; nan where it is undefined."""
 
     column: str
     unit: str
     rms: float
-    largest: float  # of its size
+    largest: float  # greatest absolute difference
     largest_tick: int  # of A; -1 where no tick differs
-    spread: float  # rms of A about its mean, to judge the others by
-    ticks: int  # that are not the same to the bit
-    first_tick: int  # of A, the first of them; -1 where there is none
+    spread: float  # rms of A about its mean, the scale for the differences
+    ticks: int  # number of ticks that differ in any bit
+    first_tick: int  # of A, first tick that differs; -1 where no tick differs
     first_t: float  # s, of A
 
 
@@ -41,23 +40,23 @@ class Comparison(NamedTuple):
     b: Bundle
     aligned: str  # "tick" or "reference"
     offset: int  # tick of B minus tick of A at the same moment
-    rows_a: np.ndarray  # (n,) rows of A and of B that were compared
+    rows_a: np.ndarray  # (n,) compared rows of A; rows_b: of B
     rows_b: np.ndarray
     signals: tuple[SignalDifference, ...]
-    only_a: tuple[str, ...]  # columns that the other does not have
+    only_a: tuple[str, ...]  # columns missing in B
     only_b: tuple[str, ...]
-    steps_a: list[dict[str, float | None]]  # as from `step_metrics`
+    steps_a: list[dict[str, float | None]]  # from `step_metrics`
     steps_b: list[dict[str, float | None]]
 
     @property
     def same(self) -> bool:
-        """Whether both hold the same ticks and the same columns, to the bit."""
+        """Whether both hold the same ticks and columns, identical to the bit."""
         whole = len(self.rows_a) == len(self.a.columns["t"]) == len(self.b.columns["t"])
         return whole and not self.offset and not self.only_a and not self.only_b and not self.different
 
     @property
     def different(self) -> tuple[SignalDifference, ...]:
-        """Those that differ, first tick first."""
+        """Signals that differ, ordered by their first tick."""
         return tuple(sorted((s for s in self.signals if s.ticks), key=lambda s: s.first_tick))
 
 
@@ -66,10 +65,10 @@ def compare(
 ) -> Comparison:
     """Compare two bundles; `columns` limits it to some.
 
-    `align`: "tick" takes rows with the same tick together (the same row where there are no ticks), "reference" those
-    that are as long after the reference's first move, "auto" the second unless ticks in common have the same reference
-    or one never moves. Raises UserError for bundles that are none or are of different machines or rates, NoAnswer where
-    they have no tick in common.
+    `align="tick"` pairs rows with the same tick (the same row number where there are no ticks). "reference" pairs rows
+    equally long after the first move of the reference. "auto" is "reference", unless common ticks have the same
+    reference or one reference never moves. Raises UserError for an invalid bundle and for different machines or
+    rates, NoAnswer where no tick is common.
     """
     a = a if isinstance(a, Bundle) else load_bundle(a)
     b = b if isinstance(b, Bundle) else load_bundle(b)
@@ -80,19 +79,19 @@ def compare(
         raise NoAnswer(f"{a.folder} and {b.folder} have no tick in common when aligned by {aligned}")
     names, only_a, only_b = _names(a, b, columns)
     if aligned == "reference" and offset:
-        names = [name for name in names if name not in ("tick", "t", "order")]  # they differ, and it means nothing
+        names = [name for name in names if name not in ("tick", "t", "order")]  # their offsets do not count
     signals = tuple(_difference(a, b, name, rows_a, rows_b) for name in names)
     return Comparison(a, b, aligned, offset, rows_a, rows_b, signals, only_a, only_b, steps(a), steps(b))
 
 
 def ticks(bundle: Bundle) -> np.ndarray:
-    """Number of each row's tick (n,); the row's where there is no such column."""
+    """Tick number of each row (n,); the row number where there is no column `tick`."""
     found = bundle.columns.get("tick")
     return np.arange(len(bundle.columns["t"])) if found is None else found.astype(np.int64)
 
 
 def steps(bundle: Bundle) -> list[dict[str, float | None]]:
-    """Metrics of the steps of a recording, while it ran; none where it lacks what they are made of."""
+    """Step metrics of a recording while the loop ran; empty where a needed column is missing."""
     columns = bundle.columns
     ref = next((columns[name] for name in REFERENCES if name in columns), None)
     y = next((columns[name] for name in MEASURED if name in columns), None)
@@ -134,14 +133,14 @@ def _offset(a: Bundle, b: Bundle, align: str) -> tuple[str, int]:
 
 
 def _one_reference(a: Bundle, b: Bundle) -> bool:
-    """Whether ticks in common have the same reference: one is cut out of the other, or its repeat."""
+    """Whether common ticks have the same reference: one recording is a section or a repetition of the other."""
     rows_a, rows_b = np.intersect1d(ticks(a), ticks(b), return_indices=True)[1:]
     name = next((n for n in REFERENCES if n in a.columns and n in b.columns), None)
     return name is not None and len(rows_a) > 0 and bool((a.columns[name][rows_a] == b.columns[name][rows_b]).all())
 
 
 def _start(bundle: Bundle) -> int | None:
-    """First row in which the reference has moved."""
+    """First row in which the reference has moved; None where it never moves."""
     for name in REFERENCES:
         ref = bundle.columns.get(name)
         if ref is None or not np.isfinite(ref).all():
@@ -186,7 +185,7 @@ def _difference(a: Bundle, b: Bundle, name: str, rows_a: np.ndarray, rows_b: np.
 
 
 def as_dict(found: Comparison) -> dict[str, Any]:
-    """The same as JSON holds it."""
+    """A comparison as a JSON object."""
     return {
         "a": str(found.a.folder),
         "b": str(found.b.folder),

@@ -1,7 +1,7 @@
-"""Rows that a recording lacks at its end, joined to it; or a bundle of such rows alone.
+"""Join of rows from shared memory to the end of a recording, or a bundle of these rows alone.
 
-A killed run leaves its last rows in shared memory. Nothing that was recorded changes, and the old file is there until
-the new one is on the disk.
+A killed run leaves its last rows in shared memory. Recorded rows do not change. The old file stays until the new file
+is on the disk.
 """
 
 import contextlib
@@ -25,14 +25,14 @@ from rtctl.trace.repair import gaps, repair
 
 class Joined(NamedTuple):
     folder: Path
-    rows: int  # joined
-    first: int | None  # tick of the first of them
+    rows: int  # number of rows joined
+    first: int | None  # tick of the first joined row; None without rows
     last: int | None
-    lost: int  # rows that are missing before or between them
+    lost: int  # rows missing before or between the joined rows
 
 
 def is_of(folder: Path, case: dict[str, Any]) -> bool:
-    """Whether a folder holds the recording that began with this case. A damaged case.json is repaired first."""
+    """Whether the recording in `folder` began with this case. A damaged case.json is repaired first."""
     held = [*part_folders(folder), *(folder / name for name in (ARROWS, PARQUET))] if folder.is_dir() else []
     if case.get("recorded_at") is None or not any(path.exists() for path in held):
         return False
@@ -45,9 +45,9 @@ def is_of(folder: Path, case: dict[str, Any]) -> bool:
 
 
 def join(folder: Path, rows: np.ndarray, columns: Sequence[Column], case: dict[str, Any]) -> Joined:
-    """Append those of `rows` (structured array, rising ticks) that come after the last recorded one; `is_of` holds.
+    """Append the `rows` (structured array, rising ticks) after the last recorded tick; requires `is_of`.
 
-    The recording is repaired first. Raises UserError where it is in use, OSError where the disk does not take it.
+    The recording is repaired first. Raises UserError where the recording is in use, OSError where a write fails.
     """
     with contextlib.suppress(NoAnswer):  # killed before its first row was written
         repair(folder)
@@ -60,7 +60,7 @@ def join(folder: Path, rows: np.ndarray, columns: Sequence[Column], case: dict[s
     losses = _missing(np.concatenate(([last], rows["tick"])))
     try:
         known = load_case(target)
-    except UserError:  # killed while the part was being made
+    except UserError:  # killed during creation of the part
         known = {"format": FORMAT, **case}
     kept = schema(columns, rows.dtype, {"case": as_json(case)})
     before: Iterator[pa.RecordBatch] = iter(())
@@ -74,14 +74,14 @@ def join(folder: Path, rows: np.ndarray, columns: Sequence[Column], case: dict[s
     write(target, chain(before, [record_batch(rows, kept)]), kept, expect=count + len(rows))
     done = Joined(folder, len(rows), int(rows["tick"][0]), int(rows["tick"][-1]), losses.rows)
     _save(target, known, count + len(rows), losses, done)
-    (target / ARROWS).unlink(missing_ok=True)  # last: until now everything can be made from it
+    (target / ARROWS).unlink(missing_ok=True)  # last: a repair needs the stream until here
     if parts:
-        repair(folder)  # the case on top
+        repair(folder)  # updates the case of all parts
     return done
 
 
 def alone(folder: Path, rows: np.ndarray, columns: Sequence[Column], case: dict[str, Any]) -> Joined:
-    """A bundle of `rows` in a new folder. Raises UserError where it is taken, OSError where the disk is full."""
+    """Write a bundle of `rows` to a new folder. Raises UserError for a taken folder, OSError where a write fails."""
     refuse_taken(folder)
     folder.mkdir(parents=True, exist_ok=True)
     case = {"format": FORMAT, **case}
@@ -94,7 +94,7 @@ def alone(folder: Path, rows: np.ndarray, columns: Sequence[Column], case: dict[
 
 
 def _last_tick(folder: Path) -> int | None:
-    """Tick of the last row of a recording in one piece; None without rows."""
+    """Tick of the last row of a recording without parts; None without rows."""
     if not (folder / PARQUET).exists():
         return None
     file = pq.ParquetFile(folder / PARQUET)

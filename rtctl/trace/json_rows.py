@@ -1,7 +1,6 @@
-"""Rows as JSON messages with a schema, the same in an MCAP file and on a live connection to Foxglove.
+"""Rows as JSON messages with a schema, for MCAP files and for a live connection to Foxglove.
 
-What was not measured (nan) or is infinite is left out of a message, since JSON does not know it. Units stand in the
-schema.
+nan (not measured) and infinite values are left out of a message: JSON has neither. The schema holds the units.
 """
 
 import json
@@ -16,7 +15,7 @@ DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
 def topic(kind: str) -> str:
-    """/ivu, so that a curve is /ivu/ref in PlotJuggler and /ivu.ref in Foxglove."""
+    """Topic name `/ivu` of kind `ivu`: a curve is /ivu/ref in PlotJuggler and /ivu.ref in Foxglove."""
     return f"/{kind}"
 
 
@@ -25,7 +24,7 @@ def schema_name(kind: str) -> str:
 
 
 def schema(name: str, columns: Sequence[Column]) -> dict[str, Any]:
-    """JSON Schema of a message; `unit` beside the type is for people and for programs that want it."""
+    """JSON Schema of a message, with the extra key `unit` beside each type."""
     return {
         "$schema": DIALECT,
         "title": name,
@@ -35,7 +34,7 @@ def schema(name: str, columns: Sequence[Column]) -> dict[str, Any]:
 
 
 def message(names: Sequence[str], row: Sequence[Any]) -> str:
-    """One row, every number with all its digits."""
+    """JSON text of one row, with all digits of every number."""
     try:
         return json.dumps(dict(zip(names, row, strict=True)), allow_nan=False)
     except ValueError:

@@ -1,22 +1,22 @@
-"""Rows that a recording does not have: how many, and which ticks."""
+"""Lost rows of a recording: number and ticks."""
 
 from typing import Any
 
 import numpy as np
 
-MOST_GAPS = 10_000  # listed; a disk that is too slow for days must not fill the memory with a list of gaps
+MOST_GAPS = 10_000  # listed gaps; bounds the memory where the disk is too slow for days
 
 
 class Losses:
-    """Counts lost rows exactly and lists the gaps as (first tick, count), joined where one follows on the other."""
+    """Exact count of lost rows, and list of gaps as (first tick, count); adjacent gaps are joined."""
 
     def __init__(self) -> None:
         self.rows = 0
-        self.unlisted = 0  # gaps beyond MOST_GAPS; their rows are counted
+        self.unlisted = 0  # number of gaps beyond MOST_GAPS; the rows of these gaps are counted
         self._gaps: list[list[int]] = []
 
     def add(self, first_tick: int, count: int) -> None:
-        """`count` rows are lost from `first_tick` on."""
+        """Count `count` lost rows from `first_tick` on."""
         if count <= 0:
             return
         self.rows += int(count)
@@ -29,7 +29,7 @@ class Losses:
             self.unlisted += 1
 
     def add_ticks(self, ticks: np.ndarray) -> None:
-        """The rows with these ticks (rising) are lost."""
+        """Count the rows with these ticks (n,), rising, as lost."""
         if len(ticks):
             for run in np.split(ticks, np.flatnonzero(np.diff(ticks) != 1) + 1):
                 self.add(run[0], len(run))
@@ -46,7 +46,7 @@ class Losses:
         return joined
 
     def between(self, first: int, end: int) -> "Losses":
-        """Those of the ticks from `first` to before `end`, as far as they are listed."""
+        """Listed losses with ticks in [first, end)."""
         found = Losses()
         for tick, count in self.gaps:
             start = max(tick, first)
@@ -54,7 +54,7 @@ class Losses:
         return found
 
     def as_dict(self) -> dict[str, Any]:
-        """What case.json says under "losses"."""
+        """Entry "losses" of case.json."""
         told: dict[str, Any] = {"rows": self.rows, "gaps": self.gaps}
         if self.unlisted:
             told["unlisted_gaps"] = self.unlisted

@@ -1,4 +1,4 @@
-"""What a step response is judged by: final error, overshoot, settling time."""
+"""Metrics of a step response: final error, overshoot, settling time."""
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
@@ -10,7 +10,7 @@ from rtctl.config.units import ANGLES
 from rtctl.machines import MODULES, Machine
 from rtctl.machines.profiles import profile_of
 
-LEAST_HOLD = 10  # samples; a reference that rests for less is still on its way
+LEAST_HOLD = 10  # samples: shortest rest of the reference that ends a step
 
 
 def step_metrics(
@@ -22,18 +22,18 @@ def step_metrics(
     settle_band: float = 0.02,
     settle_floor: float = 0.0,
 ) -> list[dict[str, float | None]]:
-    """One dict for each step of the reference `ref` (a jump or a ramp), judged by the measured `y` until the next one.
+    """Step metrics, one dict for each step of the reference `ref` (a jump or a ramp), from `y` until the next step.
 
-    `t` in s; `ref` and `y` in the machine's unit, of which one is `scale_mm` mm and `rad_per_unit` rad: `scales` has
-    both for a case. The keys:
+    `t` in s; reference `ref` and measured `y` in the machine's unit. One unit is `scale_mm` mm and `rad_per_unit` rad;
+    `scales` returns both for a case. The keys:
 
     - `t`: s, when the reference arrives at its new value; `size`: in the machine's unit, with its sign
-    - `final_error_rad`, `final_error_mm`: mean of ref - y over the last tenth of the hold; None where the
-      unit of either has no scale: an angle that moves no tape has no mm
-    - `final_error`: the same in the machine's unit, where it is neither an angle nor a way
+    - `final_error_rad`, `final_error_mm`: mean of ref - y over the last tenth of the hold; None without a scale to
+      rad or mm (an angle that moves no tape has no mm)
+    - `final_error`: mean of ref - y in the machine's unit, where that unit is neither an angle nor a length
     - `overshoot_pct`: how far y went beyond the new value, in % of the step; never negative
-    - `settling_s`: from `t` until y stays within `settle_band` of the step, or `settle_floor` (machine's unit; a few
-      counts of the sensor) where that is more; None if it does not before the next step
+    - `settling_s`: from `t` until y stays within `settle_band` (share of the step) or `settle_floor` (machine's unit; a
+      few sensor counts), the larger of both; None where y does not settle before the next step
 
     Raises ValueError where the lengths differ.
     """
@@ -45,7 +45,7 @@ def step_metrics(
     for (_, before), (start, end) in pairwise(_holds(ref, resolution)):
         size = float(ref[start] - ref[before - 1])
         if abs(size) <= resolution:
-            continue  # there and back without a rest in between
+            continue  # the reference returned without a rest
         hold = slice(start, end)
         final = _final_error(t[hold], ref[hold] - y[hold])
         steps.append(
@@ -63,20 +63,19 @@ def step_metrics(
 
 
 def machine_steps(machine: Machine, t: np.ndarray, ref: np.ndarray, y: np.ndarray) -> list[dict[str, float | None]]:
-    """`step_metrics` in the units of a machine, with what it calls settled."""
+    """`step_metrics` with the scales and the settling limits of a machine."""
     rad = 1.0 if machine.unit in ANGLES else 1.0 / machine.radius if machine.radius else None
     mm = None if machine.metres_per_unit is None else 1000.0 * machine.metres_per_unit
     return step_metrics(t, ref, y, mm, rad, settle_floor=settle_floor(machine.kind))
 
 
 def settle_floor(kind: str) -> float:
-    """Error at which a machine of this kind has settled, however small its step, in its unit; 0 of one unknown here."""
+    """Error in the machine's unit below which a machine of this kind has settled; 0 for an unknown kind."""
     return MODULES[kind].SETTLE_FLOOR if kind in MODULES else 0.0
 
 
 def final_error_unit(steps: Sequence[Mapping[str, Any]]) -> str:
-    """Unit in which people read the final errors of the steps: mm, rad where nothing moves along a line, "" (the
-    machine's own) for a speed."""
+    """Display unit of the final errors: mm; rad where nothing moves along a line; "" (machine's unit) for a speed."""
     for unit in ("mm", "rad"):
         if not steps or any(step.get(f"final_error_{unit}") is not None for step in steps):
             return unit
@@ -84,15 +83,15 @@ def final_error_unit(steps: Sequence[Mapping[str, Any]]) -> str:
 
 
 def final_error_key(unit: str) -> str:
-    """Key of the final error in a unit of `final_error_unit`."""
+    """Key of the final error for a unit from `final_error_unit`."""
     return f"final_error_{unit}" if unit else "final_error"
 
 
 def scales(case: Mapping[str, Any]) -> tuple[float | None, float | None]:
-    """mm and rad in one unit of position: rad of the capstan on an ivu, m on an ldu or another linear axis.
+    """mm and rad per unit of position. The unit is rad of the capstan on an ivu, m on an ldu or another linear axis.
 
-    mm is None on a rotary axis, rad where a linear axis has no capstan radius R_c. Raises ValueError where an ivu has
-    none.
+    mm is None on a rotary axis. rad is None on a linear axis without capstan radius R_c. Raises ValueError for an ivu
+    without R_c.
     """
     unit = (case.get("loop") or case.get("sensors") or {}).get("unit")
     if unit in ANGLES:
@@ -108,13 +107,13 @@ def scales(case: Mapping[str, Any]) -> tuple[float | None, float | None]:
 
 
 def _holds(ref: np.ndarray, resolution: float) -> list[tuple[int, int]]:
-    """The stretches [start, end) in which the reference rests."""
+    """Intervals [start, end) of rows in which the reference rests."""
     if not len(ref):
         return []
     moves = np.flatnonzero(np.abs(np.diff(ref)) > resolution) + 1  # first sample at a new value
     starts, ends = np.concatenate(([0], moves)), np.concatenate((moves, [len(ref)]))
     long = ends - starts >= LEAST_HOLD
-    long[0] = True  # a step may come right at the start
+    long[0] = True  # a step may follow the first sample
     return list(zip(starts[long].tolist(), ends[long].tolist(), strict=True))
 
 

@@ -1,7 +1,7 @@
-"""Open file whose name was taken away: where the file is now, and a copy of one that was deleted.
+"""Renamed, moved or deleted open files: present path of an open file, and copy of a deleted file.
 
-A folder that is renamed, moved or deleted does not stop a write(2): without a look at the name, rows go on into a file
-that nobody finds.
+write(2) continues after the folder was renamed, moved or deleted. Without a check of the name, rows go into a file that
+nobody finds.
 """
 
 import os
@@ -11,7 +11,7 @@ from pathlib import Path
 
 
 def in_place(fd: int, path: Path) -> bool:
-    """Whether `path` still names the open file or folder. A pipe or a device is in place always."""
+    """Whether `path` still names the open file or folder. Always True for a pipe or a device."""
     found = os.fstat(fd)
     if not stat.S_ISREG(found.st_mode) and not stat.S_ISDIR(found.st_mode):
         return True
@@ -22,7 +22,7 @@ def in_place(fd: int, path: Path) -> bool:
 
 
 def place(fd: int) -> Path | None:
-    """Present path of an open file or folder; None where it was deleted or cannot be found."""
+    """Present path of an open file or folder; None where it was deleted or is not found."""
     try:
         path = Path(os.readlink(f"/proc/self/fd/{fd}"))  # noqa: PTH115
     except OSError:
@@ -31,7 +31,7 @@ def place(fd: int) -> Path | None:
 
 
 def copied(fd: int, path: Path) -> int:
-    """Descriptor of a new file at `path` that holds all bytes of an open one, deleted or not. Raises OSError."""
+    """Descriptor of a new file at `path` with all bytes of an open, possibly deleted file. Raises OSError."""
     new = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC, 0o644)
     try:
         with Path(f"/proc/self/fd/{fd}").open("rb") as old, os.fdopen(os.dup(new), "wb") as file:
@@ -45,7 +45,7 @@ def copied(fd: int, path: Path) -> int:
 
 
 def beside(folder: Path) -> Path:
-    """Name of a folder beside one that was deleted, NAME-rescued, which is free."""
+    """Free folder name `NAME-rescued` beside a deleted folder."""
     base = folder.with_name(f"{folder.name}-rescued")
     found, number = base, 2
     while os.path.lexists(found):

@@ -1,4 +1,4 @@
-"""A bundle in a notebook: its words and table, the ways into pandas, xarray and Arrow, and a picture of its columns."""
+"""Bundle in a notebook: text, table, conversion to pandas, xarray and Arrow, and a figure of its columns."""
 
 import io
 from collections.abc import Sequence
@@ -17,11 +17,11 @@ if TYPE_CHECKING:
 
     from rtctl.trace.bundle import Bundle
 
-ROWS = 40  # columns that the table of a bundle shows
+ROWS = 40  # most columns in the table of a bundle
 
 
 def column(bundle: "Bundle", name: str) -> np.ndarray:
-    """One column (n,). Raises UserError where there is none of that name."""
+    """Column (n,). Raises UserError where no column has this name."""
     if name not in bundle.columns:
         hint = nearest(name, bundle.columns)
         raise UserError(f"{bundle.folder} has no column '{name}'" + (f"; did you mean '{hint}'?" if hint else ""))
@@ -29,28 +29,28 @@ def column(bundle: "Bundle", name: str) -> np.ndarray:
 
 
 def words(bundle: "Bundle") -> str:
-    """A bundle in one line."""
+    """Summary of a bundle in one line."""
     t = bundle.columns["t"]
     machine = machine_of(bundle)
     return f"<Bundle {bundle.folder}: {machine}{len(t)} rows, {seconds(t)}, {len(bundle.columns)} columns>"
 
 
 def machine_of(bundle: "Bundle") -> str:
-    """Name of the machine with a comma after it, "" where the case has none."""
+    """Name of the machine and a comma; "" where the case has no name."""
     config = bundle.case.get("config")
     name = (config.get("name") if isinstance(config, dict) else None) or bundle.case.get("plant")
     return f"{name}, " if name else ""
 
 
 def seconds(t: np.ndarray) -> str:
-    """How long and at what rate."""
+    """Duration in s and rate in Hz, as text."""
     if len(t) < 2 or t[-1] <= t[0]:
         return "one row" if len(t) < 2 else "no time passes"
     return f"{t[-1] - t[0]:.4g} s at {(len(t) - 1) / (t[-1] - t[0]):.4g} Hz"
 
 
 def html(bundle: "Bundle") -> str:
-    """A table of the columns: unit, least, mean and greatest value."""
+    """HTML table of the columns: unit, least, mean and greatest value."""
     rows = []
     for name, values in list(bundle.columns.items())[:ROWS]:
         finite = values[np.isfinite(values)] if values.dtype.kind == "f" else values
@@ -65,7 +65,7 @@ def html(bundle: "Bundle") -> str:
 
 
 def arrow(bundle: "Bundle") -> pa.Table:
-    """The columns as a table of Arrow, with their units in the metadata of the fields."""
+    """Arrow table of the columns, with units in the metadata of the fields."""
     fields = [
         pa.field(name, pa.from_numpy_dtype(values.dtype), metadata={"unit": bundle.units.get(name, "")})
         for name, values in bundle.columns.items()
@@ -74,14 +74,14 @@ def arrow(bundle: "Bundle") -> pa.Table:
 
 
 def to_pandas(bundle: "Bundle") -> Any:
-    """A DataFrame with the time as its index, s, and the units in `attrs`. Raises UserError without pandas."""
+    """DataFrame indexed by time in s, with the units in `attrs`. Raises UserError without pandas."""
     frame = extra("pandas").DataFrame(bundle.columns).set_index("t")
     frame.attrs = {"units": dict(bundle.units), "folder": str(bundle.folder)}
     return frame
 
 
 def to_xarray(bundle: "Bundle") -> Any:
-    """A Dataset along the time, s, each variable with its unit. Raises UserError without xarray."""
+    """Dataset along time in s, each variable with its unit. Raises UserError without xarray."""
     xarray = extra("xarray")
     units = bundle.units
     values = {name: ("t", v, {"units": units.get(name, "")}) for name, v in bundle.columns.items() if name != "t"}
@@ -90,7 +90,7 @@ def to_xarray(bundle: "Bundle") -> Any:
 
 
 def extra(name: str) -> Any:
-    """A library that not everybody needs. Raises UserError where it is not installed."""
+    """Module of an optional dependency. Raises UserError where it is not installed."""
     try:
         return import_module(name)
     except ImportError as error:
@@ -98,9 +98,9 @@ def extra(name: str) -> Any:
 
 
 def plot(bundle: "Bundle", columns: Sequence[str]) -> "Figure":
-    """A picture of some columns over the time, those of one unit in one panel; of the known ones where none is named.
+    """Figure of `columns` over time, one panel for each unit; of all known columns where none is named.
 
-    Raises UserError where there is no such column, ValueError where none of the columns is known.
+    Raises UserError for a missing column, ValueError where no column is known.
     """
     from rtctl.trace.plot import figure_of, figure_of_columns
 
@@ -112,13 +112,13 @@ def plot(bundle: "Bundle", columns: Sequence[str]) -> "Figure":
 
 
 def in_cell(figure: "Figure") -> "Figure":
-    """The figure, which a cell shows as a picture where nobody has imported pyplot, too."""
-    figure._repr_png_ = partial(png, figure)  # type: ignore[attr-defined]  # what IPython asks an object for
+    """Figure that a notebook cell also displays without pyplot."""
+    figure._repr_png_ = partial(png, figure)  # type: ignore[attr-defined]  # IPython's hook for PNG
     return figure
 
 
 def png(figure: "Figure") -> bytes:
-    """A figure as the bytes of a PNG."""
+    """PNG bytes of a figure."""
     file = io.BytesIO()
     figure.savefig(file, format="png", bbox_inches="tight")
     return file.getvalue()

@@ -1,7 +1,7 @@
-"""The journal of what a run was told: one line for each order, so that a replay can give it again at the same tick.
+"""Journal of the orders of a run, `orders.jsonl`: one line for each order, for a replay at the same tick.
 
-Every row of a recording carries the number of the newest order that its tick had taken in (`order`), and this file,
-`orders.jsonl` beside it, says what that order was: the command record as it then stood, and settings that changed.
+Column `order` of a recording is the number of the newest order that the tick had read. The journal holds for each
+number the command record and the changed settings.
 """
 
 import json
@@ -25,22 +25,20 @@ class Order(NamedTuple):
 
 
 class Journal:
-    """Writes orders as they are given. `open` makes the file; orders from before are written into it then."""
+    """Writer of the journal. `open` creates the file and writes the earlier orders."""
 
     def __init__(self) -> None:
         self._early: list[str] = []
         self._file: Any = None
 
     def open(self, folder: Path) -> None:
-        """Keep the journal in this folder from now on. Raises OSError."""
-        self._file = os.fdopen(
-            open_stream(folder / ORDERS, os.O_APPEND), "ab", buffering=0
-        )  # no line waits in a buffer
+        """Write the journal into `folder` from now on. Raises OSError."""
+        self._file = os.fdopen(open_stream(folder / ORDERS, os.O_APPEND), "ab", buffering=0)  # unbuffered
         self._file.write("".join(self._early).encode())
         self._early = []
 
     def note(self, command: np.void, changed: dict[str, Any]) -> None:
-        """Keep an order. A disk that is full costs the replay and nothing else."""
+        """Write an order. A full disk ends the journal, and with it the replay, but not the run."""
         line = json.dumps({"order": int(command["order"]), "command": plain(command), "changed": changed}) + "\n"
         if self._file is None:
             self._early.append(line)
@@ -51,21 +49,21 @@ class Journal:
             self.close()
 
     def follow(self, folder: Path) -> None:
-        """See that the journal lies in `folder`, where its recording is now. Raises OSError."""
+        """Move the journal to `folder`, the present folder of its recording. Raises OSError."""
         if self._file is None or moved.in_place(self._file.fileno(), folder / ORDERS):
             return
         old, self._file = self._file, os.fdopen(moved.copied(self._file.fileno(), folder / ORDERS), "ab", buffering=0)
         old.close()
 
     def close(self) -> None:
-        """Nothing more will come."""
+        """Close the journal."""
         if self._file is not None:
             self._file.close()
         self._file = None
 
 
 def plain(record: np.void) -> dict[str, Any]:
-    """A record's fields as JSON holds them; arrays of records as lists."""
+    """Fields of a record as JSON values; arrays of records as lists."""
     out: dict[str, Any] = {}
     for name in record.dtype.names or ():
         value = record[name]
@@ -79,7 +77,7 @@ def plain(record: np.void) -> dict[str, Any]:
 
 
 def restore(record: Any, fields: dict[str, Any]) -> None:
-    """Put the fields of an order back into a command record; what the record does not have is left out."""
+    """Write the fields of an order into a command record. Fields that the record lacks are skipped."""
     for name, value in fields.items():
         if name not in (record.dtype.names or ()):
             continue
@@ -96,7 +94,7 @@ def restore(record: Any, fields: dict[str, Any]) -> None:
 
 
 def orders(folder: Path) -> dict[int, Order]:
-    """Orders of a recording by their number; none where it has no journal. A torn last line is left out."""
+    """Orders of a recording by number; empty without a journal. An incomplete last line is skipped."""
     path = inside(folder / ORDERS, folder)
     if not path.exists():
         return {}

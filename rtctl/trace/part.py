@@ -1,6 +1,6 @@
-"""One bundle that is being written: a stream while rows come, a Parquet file once it is finished.
+"""Part: writer of one bundle, as a stream during the recording and as a Parquet file at the end.
 
-At every moment in between, its folder holds all the rows in a form that `rtctl.trace.repair` understands.
+At every moment `rtctl.trace.repair` can rebuild the bundle, with all rows, from the folder.
 """
 
 import contextlib
@@ -19,7 +19,7 @@ from rtctl.trace.stream import StreamReader, StreamWriter
 
 
 class Part:
-    """Writes rows into `folder`, with the case on disk before the first of them. Raises OSError where it cannot."""
+    """Writer of rows into `folder`; the case is on disk before the first row. Raises OSError where a write fails."""
 
     def __init__(self, folder: Path, columns: Sequence[Column], dtype: np.dtype, case: Mapping[str, Any]):
         refuse_taken(folder)
@@ -38,13 +38,13 @@ class Part:
         return self._writer.bytes
 
     def write(self, rows: np.ndarray) -> int:
-        """Append `rows` (structured array); they are with the operating system on return. Raises OSError once."""
+        """Append `rows` (structured array), unbuffered; returns the number written. Raises OSError once."""
         return self._writer.write(rows)
 
     def look(self) -> str | None:
-        """Follow a folder that was renamed, rescue the rows of one that was deleted; a sentence about it, or None.
+        """Follow a renamed folder, or rescue the rows of a deleted folder; returns a sentence about it, or None.
 
-        Raises OSError where the disk does not take the rescued rows.
+        Raises OSError where the rescued rows cannot be written.
         """
         if self._writer.is_at(self.folder / ARROWS):
             return None
@@ -56,7 +56,7 @@ class Part:
         return f"{before / ARROWS} was deleted while it was recorded: its rows are rescued into {self.folder}"
 
     def follow(self, folder: Path) -> bool:
-        """See that the stream is in `folder`, which may have a new name; returns whether its rows had to be rescued.
+        """Keep the stream in `folder`, which may have a new name; returns whether its rows were rescued.
 
         Raises OSError.
         """
@@ -67,7 +67,7 @@ class Part:
         return True
 
     def rescue(self, folder: Path) -> None:
-        """Copy the stream into `folder` and go on there. Raises OSError; the part stays as it is then."""
+        """Copy the stream into `folder` and continue there. On failure raises OSError; the part stays unchanged."""
         folder.mkdir(parents=True, exist_ok=True)
         try:
             save_case(folder, {**self.case, "complete": False})
@@ -75,38 +75,38 @@ class Part:
         except OSError:
             with contextlib.suppress(OSError):
                 (folder / CASE).unlink(missing_ok=True)
-                folder.rmdir()  # not with somebody else's files in it
+                folder.rmdir()  # fails, as it should, where the folder holds other files
             raise
         self.folder = folder
 
     def close(self) -> None:
-        """No more rows. Raises OSError where the disk does not take the end."""
+        """Close the stream. Raises OSError where the end cannot be written."""
         self._writer.close()
 
     def finish(self, extra: Mapping[str, Any], losses: Losses, error: Exception | None) -> None:
-        """Make the bundle; `extra` goes into the case. May be called again after it has failed.
+        """Finish the bundle; `extra` goes into the case. May be called again after a failure.
 
-        Raises OSError where the disk does not take the Parquet file; the stream then stays, for `repair`.
+        Raises OSError where the Parquet file cannot be written. The stream then stays, for `repair`.
         """
         self.case = {**self.case, **extra, "rows": self.rows, **told(losses, error)}
         reader = StreamReader(self.folder / ARROWS)
         try:
             write_parquet(self.folder, reader, self._writer.schema, expect=self.rows)
         except OSError:
-            save_case(self.folder, {**self.case, "complete": False})  # the losses are known only here
+            save_case(self.folder, {**self.case, "complete": False})  # `repair` does not know the losses
             raise
         save_case(self.folder, self.case)
-        reader.path.unlink()  # last: until now everything can be made from it
+        reader.path.unlink()  # last: a repair needs the stream until here
 
 
 def told(losses: Losses, error: Exception | None) -> dict[str, Any]:
-    """What a case says of rows that are missing."""
+    """Entries of the case about lost rows and the error."""
     words: dict[str, Any] = {"losses": losses.as_dict(), "complete": not losses.rows and not error}
     return {**words, "recording_error": str(error)} if error else words
 
 
 def refuse_taken(folder: Path) -> None:
-    """Raises UserError where the folder holds a recording, or a part of one."""
+    """Raise UserError where the folder holds a recording or parts of a recording."""
     names = [name for name in (ARROWS, PARQUET) if (folder / name).exists()]
     names += [part.name for part in part_folders(folder)[:1]]
     if names:

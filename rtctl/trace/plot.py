@@ -1,4 +1,4 @@
-"""A picture of a run: position and reference, error, outputs, tension, one above the other over the same time."""
+"""Figure of a run: panels of position and reference, error, outputs and tension over a common time axis."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -16,7 +16,7 @@ from rtctl.machines.profiles import profile_of
 from rtctl.trace.bundle import Bundle
 from rtctl.trace.metrics import final_error_key, final_error_unit
 
-BUCKETS = 1500  # about the pixels of a panel's width
+BUCKETS = 1500  # about the width of a panel in pixels
 
 
 class Trace(NamedTuple):
@@ -28,7 +28,7 @@ class Trace(NamedTuple):
 
 class Panel(NamedTuple):
     title: str
-    unit: str | None  # None: that of the position
+    unit: str | None  # None: the unit of the position
     traces: tuple[Trace, ...]
 
 
@@ -90,7 +90,7 @@ def plot_run(
     path: Path | str,
     title: str | None = None,
 ) -> Path:
-    """Draw a bundle, or columns by name with `t` in s, into a PNG at `path`; what of the known names is there is drawn.
+    """Draw the known columns of a bundle, or of a dict with `t` in s, into a PNG at `path`; returns the path.
 
     Raises as `figure_of`, and UserError where the file cannot be written.
     """
@@ -101,9 +101,9 @@ def plot_run(
 def figure_of(
     run: Bundle | Mapping[str, np.ndarray], metrics: Sequence[Mapping[str, Any]], title: str | None = None
 ) -> Figure:
-    """The same as a figure.
+    """Figure of the known columns of a run.
 
-    `metrics` as from `step_metrics` (may be empty). The title is the case's machine and date where none is given.
+    `metrics` come from `step_metrics` and may be empty. The default title is the machine and date of the case.
     Raises ValueError where there is no `t`, or nothing to draw.
     """
     bundle = run if isinstance(run, Bundle) else None
@@ -126,7 +126,7 @@ def figure_of(
 
 
 def figure_of_columns(bundle: Bundle, names: Sequence[str]) -> Figure:
-    """Columns of a bundle over the time, those of one unit in one panel."""
+    """Figure of columns of a bundle over time, one panel for each unit."""
     units = dict.fromkeys(bundle.units.get(name, "") for name in names)
     panels = []
     for unit in units:
@@ -139,7 +139,7 @@ def figure_of_columns(bundle: Bundle, names: Sequence[str]) -> Figure:
 def _drawn(
     panels: Sequence[Panel], columns: Mapping[str, np.ndarray], heights: Sequence[float]
 ) -> tuple[Figure, list[Axes]]:
-    """A figure with panels over one time."""
+    """Figure and axes of panels over a common time axis."""
     figure = Figure(figsize=(11, 1.2 + 1.6 * sum(heights)), dpi=130, layout="constrained")
     FigureCanvasAgg(figure)
     every = list(figure.subplots(len(panels), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0])
@@ -153,7 +153,7 @@ def _drawn(
 
 
 def save(figure: Figure, path: Path, option: str = "--plot ") -> None:
-    """Write what `option` asked for. Raises UserError where the file cannot be written."""
+    """Write a figure to `path`; messages name `option`. Raises UserError where the file cannot be written."""
     kinds = sorted(figure.canvas.get_supported_filetypes())
     if path.is_dir() or path.suffix.removeprefix(".").lower() not in kinds:
         why = "a folder" if path.is_dir() else "no kind of picture"
@@ -168,7 +168,7 @@ def save(figure: Figure, path: Path, option: str = "--plot ") -> None:
 
 
 def summary(metrics: Sequence[Mapping[str, Any]]) -> str:
-    """The steps of a run in one line."""
+    """Step metrics of a run in one line."""
     unit = final_error_unit(metrics)
     worst = max((step[final_error_key(unit)] for step in metrics), key=abs)
     over = max(step["overshoot_pct"] for step in metrics)
@@ -185,23 +185,23 @@ def summary(metrics: Sequence[Mapping[str, Any]]) -> str:
 
 
 def envelope(t: np.ndarray, y: np.ndarray, buckets: int = BUCKETS) -> tuple[np.ndarray, np.ndarray]:
-    """At most about `2 * buckets` points that cover the same ink as the whole: least and greatest of every bucket.
+    """Min-max envelope of a signal for drawing: times and values, at most about `2 * buckets` points.
 
-    nan are left out where a bucket has anything else. Short signals come back as they are.
+    A bucket drops its nan where it has other values. Short signals are returned unchanged.
     """
     if len(t) <= 2 * buckets:
         return t, y
     edges = np.linspace(0, len(t), buckets + 1).astype(int)
     first, last = edges[:-1], edges[1:] - 1
     least, greatest = np.fmin.reduceat(y, first), np.fmax.reduceat(y, first)
-    falls = y[last] < y[first]  # greatest first, or a falling line would be drawn as a zigzag
+    falls = y[last] < y[first]  # greatest first: least first would draw a falling line as a zigzag
     values = np.column_stack((np.where(falls, greatest, least), np.where(falls, least, greatest))).ravel()
     times = np.column_stack((t[first], t[last])).ravel()
     return times, values
 
 
 def _panels(columns: Mapping[str, np.ndarray], units: Mapping[str, str]) -> list[Panel]:
-    """The panels that have something to show, with only the traces that are there and their unit."""
+    """Panels with at least one existing column, with their unit and without missing traces."""
     linear = any(name in columns for name in METRES)
     found = []
     for panel in PANELS:
@@ -234,7 +234,7 @@ def _largest(y: np.ndarray) -> float:
 
 
 def _prefixed(unit: str, largest: float) -> tuple[float, str]:
-    """The factor and the unit that bring the largest value to a half or more: 2e-4 m is 200 um."""
+    """Factor and unit with SI prefix that bring the largest value to 0.5 or more: 2e-4 m is 200 um."""
     if unit not in ("m", "rad", "N", "V") or not largest:
         return 1.0, unit
     thousands = min(3, max(0, math.ceil(-math.log10(2 * largest) / 3)))

@@ -1,8 +1,8 @@
-"""Rows as protobuf messages of fixed width, so that numpy writes them all at once, and their descriptor.
+"""Rows as protobuf messages of fixed width, which numpy writes in one operation, and their descriptor.
 
 Every field has a type of fixed width: `double`, `float`, `fixed32`, `fixed64`, `sfixed32`, `sfixed64`, `bool`. The
-field's comment in the descriptor is its unit and its meaning, `[rad] reference`. Where protobuf does not allow the
-column's name as that of a field, the comment begins with it: "`position.d` [m] of the carriage".
+field's comment in the descriptor is its unit and its meaning, `[rad] reference`. A column name that is no protobuf
+identifier stands at the start of the comment: "`position.d` [m] of the carriage".
 
 Source: protobuf.dev, "Encoding" (tags and wire types) and descriptor.proto (SourceCodeInfo for comments).
 """
@@ -17,12 +17,12 @@ from rtctl.trace.columns import Column
 
 ENCODING = "protobuf"
 VARINT, I64, I32 = 0, 1, 5  # wire types
-PATH_OF_FIELD = (4, 0, 2)  # in the descriptor: message_type, its first, field; then the field's number in order
-WORDS = re.compile(r"(?:`(?P<name>[^`]+)` ?)?(?:\[(?P<unit>[^\]]*)\])?")  # what a comment begins with
+PATH_OF_FIELD = (4, 0, 2)  # in the descriptor: message_type, 0, field; the index of the field follows
+WORDS = re.compile(r"(?:`(?P<name>[^`]+)` ?)?(?:\[(?P<unit>[^\]]*)\])?")  # at the start of a comment
 
 
 class Kind(NamedTuple):
-    """One type of field: its name in descriptor.proto, its wire type, and its bytes in a message."""
+    """Field type: name in descriptor.proto, wire type, and dtype in a message."""
 
     name: str
     wire: int
@@ -64,13 +64,13 @@ def fields(columns: Sequence[Column], dtypes: Sequence[np.dtype]) -> list[Field]
 
 
 def identifier(name: str) -> str:
-    """A name that protobuf allows: letters, digits and underlines, a letter or underline first."""
+    """Protobuf identifier of a column name: letters, digits and underscores, no digit first."""
     plain = re.sub(r"\W", "_", name, flags=re.ASCII)
     return plain if plain[:1].isalpha() or plain[:1] == "_" else f"x{plain}"
 
 
 def dtype(found: Sequence[Field]) -> np.dtype:
-    """A message as a record: `tag0`, `value0`, `tag1`, `value1`, ..."""
+    """Structured dtype of a message: `tag0`, `value0`, `tag1`, `value1`, ..."""
     parts: list[tuple[str, str]] = []
     for n, field in enumerate(found):
         parts += [(f"tag{n}", f"V{len(field.tag)}"), (f"value{n}", field.kind.dtype)]
@@ -78,7 +78,7 @@ def dtype(found: Sequence[Field]) -> np.dtype:
 
 
 def descriptor(package: str, message: str, found: Sequence[Field]) -> bytes:
-    """The FileDescriptorSet of a message, serialised, as MCAP and Foxglove want it."""
+    """Serialised FileDescriptorSet of a message, for MCAP and Foxglove."""
     from google.protobuf.descriptor_pb2 import FieldDescriptorProto, FileDescriptorSet
 
     described = FileDescriptorSet()
@@ -97,7 +97,7 @@ def descriptor(package: str, message: str, found: Sequence[Field]) -> bytes:
 
 
 def comment(file: Any, field: int) -> str:
-    """Comment of a field of the first message of a FileDescriptorProto, "" if none."""
+    """Comment of a field of the first message of a FileDescriptorProto; "" without a comment."""
     for place in file.source_code_info.location:
         if tuple(place.path) == (*PATH_OF_FIELD, field):
             return str(place.leading_comments).strip()
@@ -105,7 +105,7 @@ def comment(file: Any, field: int) -> str:
 
 
 def tag(number: int, kind: Kind) -> bytes:
-    """Bytes before the value of a field."""
+    """Tag bytes of a field, which precede its value."""
     value, parts = number << 3 | kind.wire, []
     while value > 0x7F:
         parts.append(value & 0x7F | 0x80)

@@ -1,9 +1,9 @@
-"""The recorder: takes rows from the supervisor and never makes it wait.
+"""Recorder of rows, which never blocks the supervisor.
 
-A thread writes the stream; a bounded queue stands in front of it. Rows that find the queue full, or a disk that has
-failed, are lost, and the bundle says how many and which: rows put = rows written + rows queued + rows lost.
+A thread writes the stream from a bounded queue. Rows are lost where the queue is full or the disk has failed. The
+bundle holds number and ticks of the lost rows: rows put = rows written + rows queued + rows lost.
 
-Memory is flat, however long it records: the queue is bounded, and so is the list of gaps.
+Memory is constant: the queue and the list of gaps are bounded.
 """
 
 import contextlib
@@ -25,8 +25,8 @@ from rtctl.trace.orders import ORDERS
 from rtctl.trace.part import Part
 from rtctl.trace.rotation import Parts, Rotation
 
-ENOUGH = 1 << 20  # bytes that are written without waiting for more
-LOOK = 0.5  # s between two looks at whether the folder is still in its place
+ENOUGH = 1 << 20  # bytes in the queue that are written without waiting for more
+LOOK = 0.5  # s between two checks that the folder still has its path
 
 
 class RecorderStats(NamedTuple):
@@ -36,15 +36,15 @@ class RecorderStats(NamedTuple):
     bytes_written: int
     bytes_queued: int
     gaps: list[list[int]]  # [first tick, count]
-    error: str | None  # what stopped the writing, or what became of the folder, if anything did
+    error: str | None  # write failure, or move or deletion of the folder; None without
 
 
 class Recorder:
-    """Records into `folder`, which must not hold a recording yet. The case is on disk before the first row.
+    """Recorder into `folder`, which must not hold a recording yet. The case is on disk before the first row.
 
-    `max_queued_bytes` bounds the memory that a slow disk may take. `batch` is how long rows may wait for others to be
-    written with, in s: at low rates it makes the stream smaller, and it is what a crash may cost. `rotation` makes
-    parts. Raises UserError where the folder is taken, OSError where it cannot be written to.
+    `max_queued_bytes` bounds the queue. `batch` is the longest wait of a row for its batch in s: it makes the stream
+    smaller at low rates, and a crash loses the rows of this time. `rotation` splits the recording into parts. Raises
+    UserError where the folder is taken, OSError where it is not writable.
     """
 
     def __init__(
@@ -61,7 +61,7 @@ class Recorder:
         now = datetime.now(UTC).isoformat(timespec="seconds")
         self.case = {"format": FORMAT, "recorded_at": now, **case}
         self._losses = Losses()
-        self._changed = threading.Condition()  # guards all that follows; never held during I/O
+        self._changed = threading.Condition()  # guards the fields below; never held during I/O
         self._bundle: Part | Parts
         if rotation is None or rotation == Rotation():
             self._bundle = Part(self.folder, columns, dtype, self.case)
@@ -81,15 +81,15 @@ class Recorder:
         self._thread.start()
 
     def put(self, rows: np.ndarray) -> int:
-        """Hand over rows (structured array, the recorder's from now on), in order. Returns how many were lost at once.
+        """Queue rows (structured array, owned by the recorder from now on), in order; returns the number of lost rows.
 
-        Never blocks on the disk. What does not fit into the queue is lost from its end.
+        Never blocks on the disk. Where the queue is full, the last rows are lost.
         """
         with self._changed:
             if self._closing:
                 raise RuntimeError("the recorder is finished")
             room = 0 if self._error else max(0, self._most - self._queued) // rows.dtype.itemsize
-            taken = rows if len(rows) <= room else rows[:room].copy()  # a view would keep all of the rows in memory
+            taken = rows if len(rows) <= room else rows[:room].copy()  # a view would keep all rows in memory
             if len(taken):
                 self._queue.append(taken)
                 self._queued += taken.nbytes
@@ -98,13 +98,13 @@ class Recorder:
             return len(rows) - len(taken)
 
     def note_lost(self, first_tick: int, count: int) -> None:
-        """Rows that never came this far: the ring overflowed before it was drained."""
+        """Count rows lost before `put`, by an overflow of the ring."""
         with self._changed:
             self._losses.add(first_tick, count)
 
     @property
     def trouble(self) -> str | None:
-        """What stopped the writing, or what became of the folder; None while all is well."""
+        """Sentence about a write failure or a moved or deleted folder; None without either."""
         return "; ".join([*([str(self._error)] if self._error else []), *self._moves]) or None
 
     def stats(self) -> RecorderStats:
@@ -120,9 +120,9 @@ class Recorder:
             )
 
     def finish(self, extra: Mapping[str, Any] | None = None) -> Path:
-        """Write what is queued, make the bundle and return its folder; `extra` goes into the case. May be called again.
+        """Write the queue and finish the bundle; returns its folder. `extra` goes into the case. May be called again.
 
-        Raises OSError where the disk does not take the Parquet file; the stream then stays, for `repair`.
+        Raises OSError where the Parquet file cannot be written. The stream then stays, for `repair`.
         """
         if self._finished:
             return self._finished
@@ -130,7 +130,7 @@ class Recorder:
             self._closing = True
             self._changed.notify_all()
         self._thread.join()
-        self._look()  # raises where the rows of a deleted folder cannot be rescued: it is open still, for another try
+        self._look()  # where it raises, the part stays open for another call
         try:
             self._bundle.close()
         except OSError as error:
@@ -141,7 +141,7 @@ class Recorder:
         return self.folder
 
     def abandon(self) -> None:
-        """Free the folder where not one row has come, so that the next try may have it; else leave all as it is."""
+        """Remove the folder where no row came, for the next attempt; else leave it as it is."""
         if self._finished or not isinstance(self._bundle, Part):
             return
         with self._changed:
@@ -153,7 +153,7 @@ class Recorder:
             if self._bundle.rows == 0 and not self._losses.rows:
                 for name in (ARROWS, CASE, ORDERS):
                     (self.folder / name).unlink(missing_ok=True)
-                self.folder.rmdir()  # not with somebody else's files in it
+                self.folder.rmdir()  # fails, as it should, where the folder holds other files
 
     def _look(self) -> None:
         """Follow the folder where it was renamed or deleted. Raises OSError where its rows cannot be rescued."""
@@ -181,7 +181,7 @@ class Recorder:
                 if time.monotonic() - self._looked >= LOOK:
                     self._look()
                 self._bundle.write(rows)
-            except Exception as failure:  # a full disk, mostly; whatever it is, the rows must be counted
+            except Exception as failure:  # mostly a full disk; the rows must be counted for any error
                 error = failure
             with self._changed:
                 for _ in batch:
@@ -193,7 +193,7 @@ class Recorder:
                     self._give_up(error, rows[taken:])
 
     def _next_batch(self) -> list[np.ndarray]:
-        """What is written at once; it stays queued, and counted, until it is written."""
+        """Next batch to write; its rows stay in the queue, and in its count, until written."""
         batch = [self._queue[0]]
         size = batch[0].nbytes
         for rows in itertools.islice(self._queue, 1, None) if self._batch else ():

@@ -1,7 +1,7 @@
-"""Makes a bundle of what a killed recording left behind.
+"""Repair of a killed recording: a finished bundle from its stream.
 
-All batches that are whole are kept, and no row that was not recorded is made up: the result is a prefix of what the
-recorder was given. Doing it again changes nothing.
+All whole batches are kept and no row is invented: the result is a prefix of the rows given to the recorder. A second
+repair changes nothing.
 """
 
 import contextlib
@@ -26,9 +26,9 @@ BROKEN = CASE + ".broken"
 class RepairReport(NamedTuple):
     folder: Path
     rows: int  # in the bundle
-    discarded_bytes: int  # of a batch that was not whole
-    changed: bool  # False: there was nothing to do
-    notes: tuple[str, ...]  # sentences for people
+    discarded_bytes: int  # of an incomplete batch
+    changed: bool  # False: nothing was to be repaired
+    notes: tuple[str, ...]  # sentences for the user
 
     def __str__(self) -> str:
         done = "repaired" if self.changed else "nothing to repair"
@@ -38,11 +38,10 @@ class RepairReport(NamedTuple):
 
 
 def repair(folder: Path | str) -> RepairReport:
-    """Make `recording.parquet` and `case.json` whole.
+    """Repair `recording.parquet` and `case.json` of a recording, with all its parts; returns a report.
 
-    Of a long recording, all parts. Raises UserError where there is no recording or it is still being written, NoAnswer
-    where it was killed before the first bytes that could be read (its file is left as it is), OSError where the disk
-    does not take the result.
+    Raises UserError where there is no recording or it is still being written. Raises NoAnswer, and leaves the file as
+    it is, where the recording was killed before its first readable bytes. Raises OSError where a write fails.
     """
     folder = Path(folder)
     parts = part_folders(folder)
@@ -52,7 +51,7 @@ def repair(folder: Path | str) -> RepairReport:
 
 
 def _piece(folder: Path) -> RepairReport:
-    """A recording in one piece, or one part."""
+    """Repair a recording without parts, or one part."""
     stream = inside(folder / ARROWS, folder)
     rows = _rows_in(inside(folder / PARQUET, folder))
     if stream.is_file():
@@ -63,7 +62,7 @@ def _piece(folder: Path) -> RepairReport:
     else:
         raise UserError(f"{folder} holds neither {ARROWS} nor a readable {PARQUET}; there is nothing to repair")
     for name in (CASE, PARQUET):
-        for left in (folder / f"{name}.tmp", *folder.glob(f".{name}.*.tmp")):  # of a recorder that was killed
+        for left in (folder / f"{name}.tmp", *folder.glob(f".{name}.*.tmp")):  # left by a killed recorder
             with contextlib.suppress(OSError):
                 left.unlink(missing_ok=True)
     return report
@@ -77,7 +76,7 @@ def _parts(folder: Path, parts: list[Path]) -> RepairReport:
         for part in parts:
             try:
                 reports.append(_piece(part))
-            except (NoAnswer, UserError) as error:  # killed when it had just been made
+            except (NoAnswer, UserError) as error:  # killed directly after creation of the part
                 notes.append(str(error))
         changed = any(report.changed for report in reports)
         notes += [note for report in reports for note in report.notes]
@@ -91,7 +90,7 @@ def _parts(folder: Path, parts: list[Path]) -> RepairReport:
 
 
 def _on_top(folder: Path, rows: int, notes: list[str]) -> bool:
-    """The case of all parts: as it is where it tells of them, else made again. Returns whether it was."""
+    """Keep the case of all parts where it lists them, else rebuild it; returns whether it was rebuilt."""
     found = index(folder)
     try:
         case = load_case(folder)
@@ -99,7 +98,7 @@ def _on_top(folder: Path, rows: int, notes: list[str]) -> bool:
             return False
     except UserError as error:
         _not_refused(error)
-        newest = folder / found["parts"][-1]["folder"]  # it knows of all changes
+        newest = folder / found["parts"][-1]["folder"]  # the newest part holds all changes of settings
         case = {**load_case(newest), "losses": {}}
         case.pop("part", None)
         notes.append(f"{folder / CASE} was made again from that of {newest.name}")
@@ -123,7 +122,7 @@ def _discarded(case: dict[str, Any]) -> int:
 
 
 def gaps(case: dict[str, Any]) -> list[tuple[int, int]]:
-    """[first tick, count] as the case of a part lists them."""
+    """Gaps (first tick, count) listed in the case of a part."""
     losses = case.get("losses")
     listed = losses.get("gaps") if isinstance(losses, dict) else None
     pairs = [gap for gap in listed if isinstance(gap, list) and len(gap) == 2] if isinstance(listed, list) else []
@@ -135,7 +134,7 @@ def _from_stream(folder: Path, in_parquet: int | None) -> RepairReport:
     losses = Losses()
     _tally(reader, losses)
     rows, discarded = reader.rows, reader.path.stat().st_size - reader.bytes
-    made = in_parquet is None or rows > in_parquet  # else it was killed after the Parquet file was verified
+    made = in_parquet is None or rows > in_parquet  # else the kill came after verification of the Parquet file
     if made:
         if reader.schema is None:
             raise NoAnswer(f"{reader.path} ends before its list of columns: killed before its first row was written")
@@ -162,16 +161,16 @@ def _save(folder: Path, case: dict[str, Any], rows: int, losses: Losses, discard
     known = case.get("losses")
     counted = known.get("rows") if isinstance(known, dict) else None
     if not isinstance(counted, int) or counted < losses.rows:
-        known = losses.as_dict()  # else what the recorder counted is better: it knows what is lost at the end, too
+        known = losses.as_dict()  # the recorder's count, where it exists, includes losses at the end
     case = {**case, "rows": rows, "losses": known, "complete": False}
     try:
         save_case(folder, {**case, "repaired": True, "discarded_bytes": discarded})
-    except ValueError:  # read all the same, but nothing that we write
+    except ValueError:  # Python reads NaN from JSON, but `as_json` refuses to write it
         raise UserError(f"{folder / CASE} holds NaN or Infinity, which JSON does not know; write null there") from None
 
 
 def _tally(reader: StreamReader, losses: Losses) -> None:
-    """Read all that is whole; ticks that are missing in between were lost."""
+    """Read all whole batches; missing ticks between rows count as lost."""
     last: int | None = None
     for batch in reader:
         numbered = batch.schema.get_field_index("tick") >= 0 and pa.types.is_int64(batch.column("tick").type)
@@ -184,7 +183,7 @@ def _tally(reader: StreamReader, losses: Losses) -> None:
 
 
 def _case(folder: Path) -> tuple[dict[str, Any], tuple[str, ...]]:
-    """The case, and what had to be done to have one. A file that cannot be read is put aside, never thrown away."""
+    """Case, and notes about its repair. An unreadable file is renamed, never deleted."""
     inside(folder / CASE, folder)
     try:
         return load_case(folder), ()
@@ -204,25 +203,25 @@ def _case(folder: Path) -> tuple[dict[str, Any], tuple[str, ...]]:
 
 
 def _not_refused(error: UserError) -> None:
-    """Raise it where the computer refused to read a file, which may be whole (a right, a limit of open files)."""
+    """Raise `error` where the system refused the read (permission, limit of open files): the file may be whole."""
     if isinstance(error.__cause__, OSError):
         raise error
 
 
 def _embedded(folder: Path) -> dict[str, Any] | None:
-    """The case as the recorder put it into the recording."""
+    """Copy of the case inside the recording."""
     text = (pq.read_schema(folder / PARQUET).metadata or {}).get(b"case")
     return json.loads(text) if text else None
 
 
 def _rows_in(parquet: Path) -> int | None:
-    """Rows of a Parquet file; None where there is none, or a damaged one. Raises OSError where it may not be read."""
+    """Number of rows of a Parquet file; None for a missing or damaged file. Raises OSError without permission."""
     try:
         return pq.read_metadata(parquet).num_rows
     except FileNotFoundError:
         return None
     except OSError as error:
-        if error.errno is not None:  # of the computer; that of a damaged file has none
+        if error.errno is not None:  # error of the system; the error of a damaged file has no errno
             raise
         return None
     except pa.ArrowException:

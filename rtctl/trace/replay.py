@@ -1,7 +1,7 @@
-"""Gives a recording to the law that made it, once more, and compares what it writes with what was written.
+"""Replay of a recording through its control law, and comparison of the outputs with the recorded outputs.
 
-A recording from the first tick on holds all that went into the law: what was read, when frames came, how late ticks
-woke, and, in the journal beside it, what it was told. So the same law writes the same voltages, to the bit.
+A recording from the first tick on holds all inputs of the law: sensor values, times of frames and lateness of ticks.
+The journal beside it holds the orders. Therefore the same law writes the same voltages, to the bit.
 """
 
 import hashlib
@@ -24,49 +24,48 @@ from rtctl.sources import sources_hash
 from rtctl.trace.bundle import Bundle, load_bundle
 from rtctl.trace.orders import orders, restore
 
-ABSENT = {"watchdog": 0.0}  # what a recording means that was made before there was this column
-GIVEN = ("tick", "t", "period", "lateness")  # of a row, beside what was read
+ABSENT = {"watchdog": 0.0}  # values for columns missing in older recordings
+GIVEN = ("tick", "t", "period", "lateness")  # inputs of the law in a row, beside the sensor values
 
 
 class Difference(NamedTuple):
-    """Where a signal first came out otherwise."""
+    """First difference of a signal between recording and replay."""
 
     column: str
     tick: int
     t: float  # s
     recorded: float
     replayed: float
-    ticks: int  # that differ
+    ticks: int  # number of ticks that differ
     largest: float
 
 
 class Replayed(NamedTuple):
-    """What came of it. `rows` (n,) are those of the replay, `recorded` (n,) those of the recording."""
+    """Result of a replay: `rows` (n,) of the replay and `recorded` (n,) of the recording."""
 
     bundle: Bundle
     recorded: np.ndarray
     rows: np.ndarray
     compared: tuple[str, ...]
-    written: tuple[str, ...]  # of them, what is written to the drives
-    differences: tuple[Difference, ...]  # of each column that differs, first tick first
+    written: tuple[str, ...]  # columns that are written to the drives
+    differences: tuple[Difference, ...]  # of each column that differs, ordered by first tick
     stopped: str  # why not all rows were replayed, "" for all
-    changed: dict[str, Any]  # settings that are others than they were
-    same_program: bool  # whether the recording was made by this version of everything
+    changed: dict[str, Any]  # settings that differ from the recording
+    same_program: bool  # whether the recording was made by the same sources
 
     @property
     def identical(self) -> bool:
-        """To the bit, in every column."""
+        """Whether every column is identical to the bit."""
         return not self.differences
 
 
 def replay(folder: Path | str, changed: Mapping[str, Any] | None = None, own: Iterable[Path | str] = ()) -> Replayed:
     """Replay the bundle in `folder`, with settings `changed` by their dotted path.
 
-    `own` are files of the user's own by path, where the recording was made with some: their text has to be the text in
-    the bundle, which itself is never run.
+    `own` are paths of the user code that the recording was made with. Each text must equal the text in the bundle;
+    code from the bundle never runs.
 
-    Raises UserError for a bundle that is none or whose settings do not fit, NoAnswer for one that does not hold what a
-    replay needs.
+    Raises UserError for an invalid bundle or settings that do not fit, NoAnswer where inputs of the replay are missing.
     """
     bundle = load_bundle(folder)
     give(map(Path, own))
@@ -74,7 +73,7 @@ def replay(folder: Path | str, changed: Mapping[str, Any] | None = None, own: It
 
 
 def replay_bundle(bundle: Bundle, changed: Mapping[str, Any] | None = None) -> Replayed:
-    """Replay a bundle that is read already, as `replay` does."""
+    """Replay a loaded bundle, as `replay` does."""
     config, changed = _config(bundle), dict(changed or {})
     config = set_paths(config, changed)
     machine = _machine(config)
@@ -97,11 +96,11 @@ def replay_bundle(bundle: Bundle, changed: Mapping[str, Any] | None = None) -> R
 
 
 def _config(bundle: Bundle) -> Any:
-    """The settings that the recording started with."""
+    """Settings at the start of the recording."""
     given = bundle.case.get("config")
     model = machines.class_of(given)
     if model is None or not isinstance(given, dict):
-        raise NoAnswer(f"{bundle.folder}: its case has no rtctl `config`, so nobody knows the law to replay")
+        raise NoAnswer(f"{bundle.folder}: its case has no rtctl `config`, so the law to replay is unknown")
     try:
         model, given = machines.widened(given)
         return model.model_validate(given)
@@ -114,14 +113,14 @@ def _config(bundle: Bundle) -> Any:
 
 
 def _foreign(bundle: Bundle, given: dict[str, Any]) -> str:
-    """What to type where the recording was made with code, and the code was not given."""
+    """Message for a recording made with user code that was not given."""
     told = given.get("own")
     texts = {name: text for name, text in (told if isinstance(told, dict) else {}).items() if isinstance(text, str)}
     words = " ".join(f"--own {shlex.quote(name)}" for name in texts)
     sums = ", ".join(f"{name} {hashlib.sha256(text.encode()).hexdigest()}" for name, text in texts.items())
     return (
-        f"{bundle.folder} was recorded with code of its owner, and rtctl runs no code that comes with data. Read it "
-        f"and give the files by path: rtctl replay {shlex.quote(str(bundle.folder))} {words}; their sha256 has to be "
+        f"{bundle.folder} was recorded with user code, and rtctl never runs code from a bundle. Read the code "
+        f"and give the files by path: rtctl replay {shlex.quote(str(bundle.folder))} {words}; their sha256 must be "
         f"that of the texts in case.json: {sums}"
     )
 
@@ -134,7 +133,7 @@ def _machine(config: Any) -> machines.Machine:
 
 
 def _rows(bundle: Bundle, machine: machines.Machine) -> tuple[np.ndarray, str]:
-    """Recorded rows (n,) up to the first that is missing, and why there are no more."""
+    """Recorded rows (n,) up to the first missing row, and the reason for the end."""
     row = generate.row_dtype(machine)
     lacking = [name for name in row.names or () if name not in bundle.columns and name not in ABSENT]
     lacking = [name for name in lacking if name in (*GIVEN, *read_columns(machine), "order", "link_age")]
@@ -143,7 +142,7 @@ def _rows(bundle: Bundle, machine: machines.Machine) -> tuple[np.ndarray, str]:
     ticks = bundle.columns["tick"].astype(np.int64)
     if ticks[0] != 0:
         raise NoAnswer(
-            f"{bundle.folder} begins at tick {ticks[0]}: what the law remembered then is not in it; "
+            f"{bundle.folder} begins at tick {ticks[0]}: the state of the law at that tick is not recorded; "
             "replay the recording of the run itself, which begins at 0"
         )
     gaps = np.flatnonzero(np.diff(ticks) != 1)
@@ -155,13 +154,13 @@ def _rows(bundle: Bundle, machine: machines.Machine) -> tuple[np.ndarray, str]:
 
 
 def _stretches(order: np.ndarray) -> list[tuple[float, int]]:
-    """Number of the order in force and for how many rows, one after the other."""
+    """Run lengths of the column `order`: order in force and number of its rows."""
     starts = np.flatnonzero(np.diff(order, prepend=np.nan) != 0)
     return [(float(order[a]), int(b - a)) for a, b in zip(starts, [*starts[1:], len(order)], strict=True)]
 
 
 def _obey(made: Replay, config: Any, told: dict[int, Any], number: int, changed: Mapping[str, Any]) -> Any:
-    """Give order `number`, and the changes of those before it that no tick saw. Returns the settings then in force."""
+    """Apply order `number` and the changes of earlier orders that no tick read; returns the settings in force."""
     last = int(made.c["order"][0])
     new = {path: value for n in range(last + 1, number + 1) if n in told for path, value in told[n].changed.items()}
     if number and number not in told:

@@ -1,11 +1,11 @@
-"""Long recordings: a bundle in numbered parts, each a bundle of its own, with one case.json on top.
+"""Rotation of long recordings: a bundle of numbered parts, each itself a bundle, with one case.json on top.
 
-    run/case.json                 of all parts: what the owner believes, rows, losses, and `parts`, the list of them
+    run/case.json                 of all parts: settings, nominal model, rows, losses, and the list `parts`
     run/part-0001/case.json, recording.parquet
-    run/part-0002/case.json, recording.arrows      the one that is being written
+    run/part-0002/case.json, recording.arrows      the part in progress
 
-A part that is full is made into Parquet by a thread of its own while the next one is written, so that the rows go on
-reaching the disk and the end of a long run does not wait for hours of rows to be compressed.
+A separate thread converts a full part to Parquet while the next part is written. Rows keep reaching the disk, and the
+end of a long run does not wait for the compression of hours of rows.
 """
 
 import os
@@ -30,10 +30,10 @@ BEGINNING, END = -(2**63), 2**63 - 1  # before the first tick, after the last
 
 
 class Rotation(NamedTuple):
-    """When a part is full: what comes first. None: never."""
+    """Limits of a part; the first one reached ends the part. None: no limit."""
 
-    megabytes: float | None = None  # of the stream, which is some times larger than the Parquet file
-    minutes: float | None = None  # of the column t
+    megabytes: float | None = None  # size of the stream, which is several times the size of the Parquet file
+    minutes: float | None = None  # by the column t
 
 
 class _Full(NamedTuple):
@@ -42,10 +42,10 @@ class _Full(NamedTuple):
 
 
 class Parts:
-    """Writes rows, which have `tick` and `t`, into parts of `folder`; it is locked while it is recorded into.
+    """Writer of rows with `tick` and `t` into parts of `folder`, which is locked during the recording.
 
-    The same methods as a `Part`, which has only itself. `lost(first, end)` tells the losses from one tick to before
-    another. Raises UserError where the folder is taken, OSError where it cannot be written to.
+    Has the methods of a `Part`. `lost(first, end)` returns the losses with ticks in [first, end). Raises UserError
+    where the folder is taken, OSError where it is not writable.
     """
 
     def __init__(
@@ -63,10 +63,10 @@ class Parts:
         self._bytes = float("inf") if rotation.megabytes is None else rotation.megabytes * MEGABYTE
         self._seconds = float("inf") if rotation.minutes is None else rotation.minutes * 60.0
         self._failed: list[_Full] = []
-        self._known: dict[str, tuple[int, int]] = {}  # first tick and rows of the parts that are full
-        self._looking = threading.Lock()  # the recorder's thread and that of the parts follow one folder
-        self._news: list[str] = []  # sentences that no `look` has told yet
-        self._before = (0, 0)  # rows and bytes of the parts that are full
+        self._known: dict[str, tuple[int, int]] = {}  # first tick and rows of the full parts
+        self._looking = threading.Lock()  # the recorder thread and the conversion thread both follow the folder
+        self._news: list[str] = []  # sentences that `look` has not returned yet
+        self._before = (0, 0)  # rows and bytes of the full parts
         self._number = 0
         self._lock = os.open(folder, os.O_RDONLY)
         try:
@@ -77,8 +77,8 @@ class Parts:
             self._unlock()
             raise
         self._first_tick = BEGINNING
-        self._began = 0  # first tick in it
-        self._end = self._seconds  # t at which the part is full
+        self._began = 0  # first tick in the open part
+        self._end = self._seconds  # t in s at which the open part is full
         self._full: queue.SimpleQueue[_Full | None] = queue.SimpleQueue()
         self._thread = threading.Thread(target=self._make_bundles, name="parts", daemon=True)
         self._thread.start()
@@ -92,7 +92,7 @@ class Parts:
         return self._before[1] + self._part.bytes
 
     def write(self, rows: np.ndarray) -> int:
-        """Append `rows` to the part that is open, or to as many as it takes. Raises OSError as a `Part` does."""
+        """Append `rows` to the open part and to as many new parts as needed. Raises OSError as a `Part` does."""
         written = 0
         while len(rows):
             if self._part.rows and (self._part.bytes >= self._bytes or rows["t"][0] >= self._end):
@@ -106,17 +106,19 @@ class Parts:
         return written
 
     def look(self) -> str | None:
-        """As a `Part` does. Parts that were full when the folder was deleted are lost; `finish` counts their rows."""
+        """Follow the folder as a `Part` does. Full parts in a deleted folder are lost; `finish` counts their rows."""
         with self._looking:
             self._look_on_top()
             wanted = self.folder / self._part.folder.name
             if self._part.follow(wanted) and not self._news:
-                self._news.append(f"{wanted} was taken away while it was recorded: its rows are rescued into it anew")
+                self._news.append(
+                    f"{wanted} was moved or deleted while it was recorded: its rows are rescued into a new one"
+                )
             told, self._news = "; ".join(self._news) or None, []
             return told
 
     def _look_on_top(self) -> None:
-        """Follow the folder of all parts, or make another for the parts that come."""
+        """Follow the folder of all parts, or create another folder for the next parts."""
         if self._lock < 0 or moved.in_place(self._lock, self.folder):
             return
         before, now = self.folder, moved.place(self._lock)
@@ -135,14 +137,13 @@ class Parts:
         self._news.append(f"{before} was deleted while it was recorded: its rows are rescued into {folder}{gone}")
 
     def close(self) -> None:
-        """No more rows. Raises OSError where the disk does not take the end."""
+        """Close the open part. Raises OSError where its end cannot be written."""
         self._part.close()
 
     def finish(self, extra: Mapping[str, Any], losses: Losses, error: Exception | None) -> None:
-        """Make the last part, wait for the others, write the case on top, and tell each part what is known now.
+        """Finish all parts, write the case on top, and update the case of each part.
 
-        Raises OSError where the disk does not take all of it; the streams that it did not take then stay, for `repair`
-        or for another call.
+        Raises OSError where a write fails. The streams of unfinished parts then stay, for `repair` or another call.
         """
         if self._thread.is_alive():
             self._known[self._part.folder.name] = (self._began, self._part.rows)
@@ -150,12 +151,12 @@ class Parts:
             self._full.put(None)
             self._thread.join()
         again, self._failed = self._failed, []
-        for full in again:  # somebody may have made room since
+        for full in again:  # disk space may have been freed since
             self._make(full)
         found = index(self.folder)
         there = {entry["folder"] for entry in found["parts"]} | {full.part.folder.name for full in self._failed}
         gone = [part for name, part in self._known.items() if name not in there and part[1]]
-        for tick, count in gone:  # deleted meanwhile, to make room or with all of the folder
+        for tick, count in gone:  # part deleted by the user, alone or with the whole folder
             losses.add(tick, count)
         rows = self.rows - sum(count for _, count in gone)
         known = {**self.case, **extra, "rows": rows, **told(losses, error), **found}
@@ -176,8 +177,8 @@ class Parts:
 
     def _rotate(self, tick: int) -> None:
         with self._looking:
-            self._look_on_top()  # else the next part would make a folder anew that was taken away
-        part = self._next()  # first: where the disk is full, the part that is open stays what it is
+            self._look_on_top()  # else the next part would recreate a folder that was moved or deleted
+        part = self._next()  # first: on a full disk the open part stays open
         self._before = (self.rows, self.bytes)
         self._known[self._part.folder.name] = (self._began, self._part.rows)
         self._full.put(_Full(self._part, self._lost(self._first_tick, tick)))
@@ -198,12 +199,12 @@ class Parts:
                 full.part.follow(self.folder / full.part.folder.name)
             full.part.close()
             full.part.finish({}, full.losses, None)
-        except Exception:  # a full disk, mostly; the stream stays, and `finish` tries again and tells
+        except Exception:  # mostly a full disk; the stream stays, `finish` tries again and reports
             self._failed.append(full)
 
 
 def _until(tick: int, extra: Mapping[str, Any]) -> dict[str, Any]:
-    """`extra` as it was at a tick: lists of what happened, such as `changes`, end there."""
+    """`extra` at a tick: lists of events, such as `changes`, end at the tick."""
     return {key: [each for each in value if not _after(each, tick)] if isinstance(value, list) else value
             for key, value in extra.items()}  # fmt: skip
 

@@ -1,8 +1,7 @@
-"""The file that is written while a recording runs: an Arrow IPC stream, `recording.arrows`.
+"""Arrow IPC stream `recording.arrows`: the file of a running recording.
 
-A stream is a schema message followed by one message per batch, so that whatever whole batches are on disk can be read
-back, however the writer ended. Messages are written here with plain write(2): nothing is buffered in the process, and
-a write that fails half-way is cut off again.
+A stream is a schema message followed by one message per batch. All whole batches on disk are readable, however the
+writer ended. Messages are written with plain write(2), unbuffered. A partly written message is truncated.
 
 Source: Apache Arrow columnar format, "IPC Streaming Format".
 """
@@ -22,14 +21,14 @@ from rtctl.trace import moved
 from rtctl.trace.columns import Column, record_batch, schema
 
 END_OF_STREAM = b"\xff\xff\xff\xff\x00\x00\x00\x00"
-NOT_WHOLE = (StopIteration, pa.ArrowException, UnicodeDecodeError)  # what Arrow raises at the end and at damage
+NOT_WHOLE = (StopIteration, pa.ArrowException, UnicodeDecodeError)  # Arrow's errors at the end and at damage
 
 
 class StreamWriter:
-    """Appends batches of rows to an Arrow stream; every batch is with the operating system when `write` returns.
+    """Writer of batches of rows to an Arrow stream; `write` is unbuffered.
 
-    An I/O error (disk full) is raised as OSError once, by the call that met it; the file is cut back to its whole
-    batches, and every later `write` returns 0. The file is locked while it is open, so that a repair keeps off.
+    An I/O error (disk full) raises OSError once. The file is truncated to its whole batches, and every later `write`
+    returns 0. The open file is locked against a repair.
     """
 
     def __init__(
@@ -50,7 +49,7 @@ class StreamWriter:
             raise
 
     def write(self, rows: np.ndarray) -> int:
-        """Append `rows` (structured array) as one batch. Returns the rows written: all, or 0 after a failure."""
+        """Append `rows` (structured array) as one batch; returns the number written: all, or 0 after a failure."""
         if self._file < 0:
             raise ValueError("the stream is closed")
         if self.failed or not len(rows):
@@ -60,15 +59,15 @@ class StreamWriter:
         return len(rows)
 
     def is_at(self, path: Path) -> bool:
-        """Whether `path` still names the file. True for one that is closed."""
+        """Whether `path` still names the file. True for a closed file."""
         return self._file < 0 or moved.in_place(self._file, path)
 
     def place(self) -> Path | None:
-        """Present path of the file; None where it was deleted, or is closed."""
+        """Present path of the file; None where it is deleted or closed."""
         return moved.place(self._file) if self._file >= 0 else None
 
     def move(self, path: Path) -> None:
-        """Copy what was written into a new file at `path` and go on there. Raises OSError; the old file stays then."""
+        """Copy the file to `path` and continue there. Raises OSError and keeps the old file where this fails."""
         new = moved.copied(self._file, path)
         try:
             lock(new, path)
@@ -79,7 +78,7 @@ class StreamWriter:
         self._file = new
 
     def close(self) -> None:
-        """End the stream and bring it to the disk. Raises OSError only if no earlier call did. May be called again."""
+        """End the stream and sync it to the disk. Raises OSError only if no earlier call did. May be called again."""
         if self._file < 0:
             return
         try:
@@ -96,7 +95,7 @@ class StreamWriter:
                 rest = rest[os.write(self._file, rest) :]
         except OSError:
             self.failed = True
-            with contextlib.suppress(OSError):  # not a regular file; a reader stops at the broken message anyway
+            with contextlib.suppress(OSError):  # not a regular file; a reader stops at the broken message
                 os.ftruncate(self._file, self.bytes)
             raise
         self.bytes += len(message)
@@ -108,10 +107,10 @@ class StreamWriter:
 
 
 class StreamReader:
-    """The whole batches of a stream that may be cut off anywhere, in order: `for batch in reader`.
+    """Reader of the whole batches of a stream, possibly truncated, in order: `for batch in reader`.
 
-    `schema` is None where the file ends before it. After the loop `rows` and `bytes` say how much was whole, the end
-    mark included. Raises UserError from the loop if the file is still being written.
+    `schema` is None where the file ends before it. After the loop, `rows` and `bytes` count the whole part, end mark
+    included. The loop raises UserError where the file is still being written.
     """
 
     def __init__(self, path: Path):
@@ -121,7 +120,7 @@ class StreamReader:
         self.schema: pa.Schema | None = None
         with pa.OSFile(str(path)) as file, contextlib.suppress(*NOT_WHOLE, OSError):
             schema = pa.ipc.open_stream(file).schema
-            self.schema = schema if schema.names else None  # names that are no text are told only when asked for
+            self.schema = schema if schema.names else None  # Arrow decodes names, and fails, only on access
 
     def __iter__(self) -> Iterator[pa.RecordBatch]:
         self.rows = self.bytes = 0
@@ -143,18 +142,18 @@ class StreamReader:
     def _next(stream: pa.RecordBatchReader) -> pa.RecordBatch | None:
         try:
             batch = stream.read_next_batch()
-            batch.validate()  # a damaged message may tell of more rows than it holds
+            batch.validate()  # a damaged message may declare more rows than it holds
             return batch
-        except NOT_WHOLE:  # the end, or a message that is not whole
+        except NOT_WHOLE:  # the end, or an incomplete message
             return None
         except OSError as error:
-            if error.errno:  # the disk's error, not Arrow's word for a file that is too short
+            if error.errno:  # error of the disk; Arrow's error for a short file has no errno
                 raise
             return None
 
 
 def lock(file: int, path: Path) -> None:
-    """Lock an open file against another process. The lock ends with the process that holds it, however that ends."""
+    """Lock an open file against other processes. The lock ends with its process."""
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:

@@ -1,7 +1,7 @@
 """Conditions on signals, such as `abs(error) > 1e-3 and u1 < 2`, that start a capture.
 
 An expression may hold signal names, numbers (SI, no units), + - * /, comparisons, and, or, not, abs, min, max. It is
-parsed and evaluated here, column by column; nothing in it is ever run as Python.
+evaluated column by column and never run as Python.
 """
 
 import ast
@@ -41,10 +41,10 @@ class _Part(NamedTuple):
 
 
 class Trigger:
-    """`trigger(rows)` is the index of the first row where the condition turns true, or -1; it remembers across batches.
+    """`trigger(rows)` returns the first row where the condition turns true, or -1; keeps its state between batches.
 
-    A condition that is true from the very first row on has not turned true: it must be seen false first. A comparison
-    with nan is false. Raises UserError where the expression is wrong: an unknown signal gets the nearest one's name.
+    A condition must be false once before it can turn true. A comparison with nan is false. Raises UserError for an
+    invalid expression; for an unknown signal it names the nearest known signal.
     """
 
     def __init__(self, expression: str, names: Iterable[str]):
@@ -67,7 +67,7 @@ class Trigger:
             raise UserError(f"the trigger is {len(expression)} characters long; at most {LONGEST} are allowed")
         try:
             with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # "invalid decimal literal", about a text that is refused anyway
+                warnings.simplefilter("ignore")  # "invalid decimal literal" of a text that is refused below
                 tree = ast.parse(expression.strip(), mode="eval")
         except (SyntaxError, ValueError, MemoryError, RecursionError) as error:
             where = f" near column {error.offset}" if isinstance(error, SyntaxError) and error.offset else ""

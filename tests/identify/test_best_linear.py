@@ -95,5 +95,5 @@ def test_too_short_says_what_is_enough():
 
 def test_a_band_lost_in_noise_is_named():
     records = [machine(seed, noise=20.0) for seed in range(1, 4)]
-    with pytest.raises(NoAnswer, match=r"not known to within a half from \d+"):
+    with pytest.raises(NoAnswer, match=r"deviation of the response is above 50 % from \d+"):
         best_linear.identify(records, (1.0, 100.0))

@@ -96,7 +96,7 @@ def test_a_saturated_drive_is_named_with_its_time(run):
 def test_a_loop_that_swings_from_limit_to_limit_is_told(run):
     record = records.take(run)
     u1 = 9.995 * np.sign(np.sin(0.3 * np.arange(len(record.t))))
-    with pytest.raises(NoAnswer, match="a loop that is not stable swings like that"):
+    with pytest.raises(NoAnswer, match="an unstable loop oscillates like this"):
         records.check(replace(record, columns={**record.columns, "u1": u1}), records.steady(record))
 
 
@@ -105,7 +105,7 @@ def test_a_machine_that_turns_back_is_told_with_its_time(run):
     found = records.steady(record)
     speed = record["capstan_speed"].copy()
     speed[found[1].start + 5 : found[1].start + 25] *= -1
-    with pytest.raises(NoAnswer, match=rf"turns back 20 samples long from {record.t[found[1].start + 5]:.3f} s"):
+    with pytest.raises(NoAnswer, match=rf"reverses for 20 samples from {record.t[found[1].start + 5]:.3f} s"):
         records.check(replace(record, columns={**record.columns, "capstan_speed": speed}), found)
 
 

@@ -73,9 +73,13 @@ JITTER = np.random.default_rng(7).uniform(-0.2e-3, 0.2e-3, len(K))
 @pytest.mark.parametrize(
     ("t", "rate", "words"),
     [
-        (np.delete(K, 900) / 1000, None, "line 902: 0.002 s after the row before where 0.001 s is usual; --uneven"),
+        (
+            np.delete(K, 900) / 1000,
+            None,
+            "line 902: 0.002 s after the row before where 0.001 s is usual; keep an uneven clock with --uneven",
+        ),
         (np.delete(K, 900) / 1000, 1000.0, "line 902: 0.002 s after the row before where 0.001 s is usual"),
-        (np.insert(K, 900, 899) / 1000, None, "line 902: 0.899 s after 0.899 s; time should increase; .* --rate says"),
+        (np.insert(K, 900, 899) / 1000, None, "line 902: 0.899 s after 0.899 s; time should increase; .* with --rate"),
         (np.insert(K, 900, 899) / 1000, 1000.0, "line 902: 0.899 s after 0.899 s; time should increase$"),
         (np.where(K == 700, 0.0, K / 1000), None, r"line 702: 0 s after 0.699 s; time should increase"),
         (

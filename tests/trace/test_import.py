@@ -181,7 +181,7 @@ def test_bad_rows(tmp_path, rows, words):
         ),
         ({"columns": {**MAP, "x": {"column": "qm", "unit": "furlong"}}}, "'furlong', which is not m"),
         ({"columns": {"t": "time", "u": "vir", "xx": "qm"}}, "a machine has no 'xx'; did you mean 'x'"),
-        ({"columns": {"u": "vir", "x": "qm"}}, "which column is the time.*--rate 1000"),
+        ({"columns": {"u": "vir", "x": "qm"}}, "no time column.*--rate 1000"),
         ({"rate": 500}, "time runs at 1000 rows a second where --rate says 500; one is wrong"),
         ({"plant": None}, "--plant: say what kind"),
         ({"columns": {}}, "has time, vir, qm; say which is which, e.g. --map"),
@@ -312,7 +312,7 @@ def test_what_is_no_file(tmp_path):
     with pytest.raises(UserError, match="no such file"):
         read(tmp_path / "a.csv")
     (tmp_path / "a.xlsx").write_bytes(b"x")
-    with pytest.raises(UserError, match=r"cannot import '.xlsx'; what can be is .csv, .tsv"):
+    with pytest.raises(UserError, match=r"cannot import '.xlsx'; importable are .csv, .tsv"):
         read(tmp_path / "a.xlsx")
 
 

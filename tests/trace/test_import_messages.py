@@ -266,7 +266,7 @@ def test_protobuf_messages_of_any_shape(protobuf_mcap):
 
 
 def test_protobuf_that_is_damaged(protobuf_mcap):
-    with pytest.raises(UserError, match=r"the descriptor of /row gives no message pkg.Row"):
+    with pytest.raises(UserError, match=r"the descriptor of /row has no message pkg.Row"):
         read(protobuf_mcap([("a", "DOUBLE", "")], [{"a": 1.0}], spoil=lambda data: data[:-9]))
 
 
@@ -275,7 +275,7 @@ def test_units_and_stamps_of_mcap(mcap, tmp_path):
     found = [{"a": {"x": k}, "u": k % 2, "stamp": {"sec": k, "nanosec": 5}} for k in range(N)]
     table = read(mcap({"/axis": as_json(found)}, schema=schema))
     assert table.units == {"a.x": "mm", "log_time": "s"} and table.clock == "log_time"
-    assert any("--map t=stamp takes it as the clock" in note for note in table.notes)
+    assert any("take it as the clock with --map t=stamp" in note for note in table.notes)
     make_bundle(table, Plan(plant="axis", columns={"t": "stamp", "u": "u", "x": "a.x"}), tmp_path / "b")
     bundle = load_bundle(tmp_path / "b")
     assert bundle.columns["t"].tolist() == list(range(N)) and bundle.columns["x"] == pytest.approx(np.arange(N) / 1e3)

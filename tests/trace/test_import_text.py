@@ -227,7 +227,7 @@ def test_options_that_cannot_be(tmp_path, options, words):
 
 def test_options_of_text_for_another_file(tmp_path):
     np.savez(tmp_path / "a.npz", x=np.arange(3.0))
-    with pytest.raises(UserError, match=r"a.npz is read as npz, and --decimal is of files of text"):
+    with pytest.raises(UserError, match=r"a.npz is read as npz, and --decimal applies only to text files"):
         read(tmp_path / "a.npz", TextPlan(decimal=","))
 
 
@@ -299,7 +299,7 @@ def test_recordings_that_failed(tmp_path, file, options, rows, rate, x):
         ("csv_units_in_name/suffix.csv", "--map t=time_ms,u=u_mV,x=x_mm", "--unit t=ms if it is"),
         ("csv_preamble/rowno.csv", U, "line 8 has 4 cells and the rows have 3"),
         ("csv_preamble/tds.csv", "--map t=4,u=5,x=5", "line 4 has 3 cells"),
-        ("csv_units_row/rigol.csv", "--map t=X,u=CH1,x=CH2", r"column 'X' \(t\) is a mere number.*--unit t="),
+        ("csv_units_row/rigol.csv", "--map t=X,u=CH1,x=CH2", r"column 'X' \(t\) is a number without unit.*--unit t="),
     ],
 )
 def test_recordings_that_are_refused(tmp_path, capsys, file, options, words):

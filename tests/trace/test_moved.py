@@ -119,7 +119,7 @@ def test_a_part_that_is_deleted_alone_comes_back(tmp_path: Path) -> None:
     run = record(tmp_path / "run", PARTS)
     shutil.rmtree(tmp_path / "run" / "part-0002")
     put(run, 60, 130)
-    assert "part-0002 was taken away" in str(run.trouble)
+    assert "part-0002 was moved or deleted" in str(run.trouble)
     assert run.finish() == tmp_path / "run" and is_truth(load_bundle(tmp_path / "run").columns, range(130))
 
 

@@ -204,7 +204,7 @@ def test_a_recording_in_progress_is_left_alone(tmp_path):
 def test_a_part_that_is_gone_is_told_and_the_rest_can_be_had(tmp_path):
     folder = record(tmp_path / "run")
     shutil.rmtree(folder / "part-0002")
-    with pytest.raises(UserError, match=r"lists other parts than are there .*rtctl trace repair"):
+    with pytest.raises(UserError, match=r"lists other parts than the folder holds .*rtctl trace repair"):
         load_bundle(folder)
     report = repair(folder)
     found = load_bundle(folder)

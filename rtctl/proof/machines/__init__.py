@@ -1,6 +1,6 @@
-"""Concealed cases for described machines (exchange format 2): equations, solver and effects of their own.
+"""Concealed cases of described machines (exchange format 2), with independent equations, solver and effects.
 
-No code is shared with plants/ or rtctl/diagnose. Seal, scores, reports and motions are those of rtctl/proof.
+No code is shared with plants/ or rtctl/diagnose. Seal, scores, reports and motions come from rtctl/proof.
 """
 
 TOPOLOGIES = ("belt", "arm", "screw", "torsion", "pendulum", "hoist", "spindle", "gantry", "two-motor", "axis")

@@ -1,7 +1,6 @@
-"""Record of the true machine: one field a parameter, one row a body, joint, drive or sensor; SI units.
+"""Record of the true machine: a field for each parameter, a row for each body, joint, drive or sensor; SI units.
 
-A field that belongs to an effect is neutral by default, so that a machine without missing physics names only its
-described values.
+Fields of effects are neutral by default: a machine without missing physics sets only its described values.
 """
 
 from typing import Any
@@ -24,10 +23,10 @@ BODY: dict[str, tuple[int, float]] = {  # field -> (columns, default)
     "b_as": (0, 0.0), "b_Bas": (0, 0.0),  # asymmetry of dry (share) and viscous friction
     "b_mu": (0, 0.0), "b_mu_g": (0, 0.0),  # friction by joint force and by gravity load
     "b_quad": (0, 0.0), "b_power": (0, 2.0),  # drag
-    "b_pF": (0, 0.0), "b_pform": (0, 0.0), "b_pat": (0, 0.0), "b_pw": (0, 1.0),  # dry friction along the way
-    "b_warm": (0, 0.0), "b_warm_tau": (0, 1.0),  # dry friction that falls with running time
+    "b_pF": (0, 0.0), "b_pform": (0, 0.0), "b_pat": (0, 0.0), "b_pw": (0, 1.0),  # dry friction by position
+    "b_warm": (0, 0.0), "b_warm_tau": (0, 1.0),  # dry friction that decreases with running time
     "b_g": (NG, 0.0), "b_ga": (NG, 0.0), "b_gc": (0, 0.0),  # gravity of the description: m g r, angle; constant
-    "b_gx": (0, 0.0), "b_gxa": (0, 0.0), "b_gxc": (0, 0.0),  # gravity that the description lacks
+    "b_gx": (0, 0.0), "b_gxa": (0, 0.0), "b_gxc": (0, 0.0),  # gravity missing in the description
     "b_im": (0, 0.0), "b_ima": (0, 0.0),  # imbalance
     "b_cog": (NH, 0.0), "b_cogn": (NH, 1.0), "b_coga": (NH, 0.0),
     "b_k": (0, 0.0), "b_k3": (0, 0.0), "b_ksat": (0, ENDLESS), "b_x0": (0, 0.0),
@@ -68,7 +67,7 @@ def _dtype() -> list[Any]:
 
 
 def neutral() -> np.ndarray:
-    """Record () of a machine without bodies; every effect absent."""
+    """Record () of a machine without bodies and effects."""
     m = np.zeros((), _dtype())
     for name, value in SCALAR.items():
         m[name] = value
@@ -79,7 +78,7 @@ def neutral() -> np.ndarray:
 
 
 def coordinates(m: np.ndarray) -> None:
-    """Fill b_coord and b_ratio: bodies behind rigid joints follow the coordinate of the body they are joined to."""
+    """Fill b_coord and b_ratio: bodies behind rigid joints share the coordinate of the joined body."""
     nb, nj = int(m["nb"]), int(m["nj"])
     m["b_coord"], m["b_ratio"] = np.arange(NB), 1.0
     for _ in range(nb):
@@ -114,7 +113,7 @@ def add_joint(m: np.ndarray, a: int, b: int, n: float, k: float, d: float) -> in
 
 
 def bristles(m: np.ndarray, natural: float = 4000.0) -> None:
-    """Stiffness of dry friction before sliding: the coordinate swings on it at `natural` rad/s, far below a count."""
+    """Set the presliding stiffness for a natural frequency of `natural` rad/s: deflections far below a count."""
     for i in range(int(m["nb"])):
         c = m["b_coord"][i]
         J = sum(m["b_ratio"][k] ** 2 * m["b_J"][k] for k in range(int(m["nb"])) if m["b_coord"][k] == c)

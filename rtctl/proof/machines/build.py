@@ -1,4 +1,4 @@
-"""Machine without missing physics: topology drawn, motion drawn, drives and law sized to both, owner's case written."""
+"""Sound machine: random topology and motion, drives and law sized to both, and its case with nominal values."""
 
 import math
 from typing import Any
@@ -15,7 +15,7 @@ from rtctl.proof.machines.law import law_record
 from rtctl.proof.machines.setup import Hidden, Setup
 
 Json = dict[str, Any]
-SETTLE_S = 1.5  # under the law, before the first row
+SETTLE_S = 1.5  # s of closed loop before the first row
 OPEN = " Open loop: the command was played from a file."
 CLOSED = (
     " ref is the reference of {0}; the controller is not described, take the recorded command as the input. "
@@ -24,7 +24,7 @@ CLOSED = (
 
 
 def sound(topology: str, rng: np.random.Generator, how: str, need: frozenset[str], edge: bool) -> Setup:
-    """Setup of a machine of `topology`; `need` holds what an effect asks for, `edge` sets the owner's values at the
+    """Setup of a sound machine of `topology`; `need` are requirements of effects, `edge` sets nominal values at the
     edges of their tolerances."""
     d = BUILD[topology](rng, need)
     Ts = 1.0 / pick(rng, *d.rates)
@@ -69,7 +69,7 @@ def _reference(d: Draft, how: str, Ts: float) -> Any:
 
 
 def _needed(d: Draft, base: str, ref: np.ndarray, Ts: float) -> tuple[float, float]:
-    """Largest force (N or Nm at the base) and speed that the reference asks for."""
+    """Largest force (N or Nm at the base) and largest speed of the reference."""
     v = ref if d.speed_loop else np.gradient(ref, Ts)
     a = float(np.quantile(np.abs(np.gradient(v, Ts)), 0.998))
     top, F = float(np.abs(v).max()), reflected(d.machine, base) * a
@@ -118,7 +118,7 @@ def _drives(
 
 
 def _more_sensors(rng: np.random.Generator, machine: Json) -> None:
-    """Now and then a reading beside the positions: a drive's current, a joint's force, an acceleration."""
+    """Add optional sensors at random: a drive's current, a joint's force, an acceleration."""
     name, drive = next(iter(machine["drives"].items()))
     roll = rng.random()
     springs = [j for j, joint in machine["joints"].items() if "stiffness" in joint]
@@ -139,13 +139,13 @@ def _more_sensors(rng: np.random.Generator, machine: Json) -> None:
 
 
 def _drive_force(drive: Json) -> float:
-    """Force at the limit of the command, at standstill."""
+    """Force of a drive at the limit of the command, at standstill."""
     Kt, R = drive.get("torque_constant", 1.0), drive.get("resistance", 1.0)
     return float(drive["gain"] * drive["limit"] * Kt / R)
 
 
 def _rounded(machine: Json) -> Json:
-    """Description whose numbers have six digits; counters and whole numbers stay."""
+    """Description with numbers of six digits; counters and whole numbers are unchanged."""
 
     def walk(x: Any) -> Any:
         if isinstance(x, dict):
@@ -161,7 +161,7 @@ def _law(
     rng: np.random.Generator, d: Draft, machine: Json, m: np.ndarray, base: str, limit: float, pre: list[float],
     delay: float, opened: bool,
 ) -> np.ndarray:  # fmt: skip
-    """PID on the position, or PI on the speed, for the machine as one rigid body."""
+    """Law record: PID on the position, or PI on the speed, designed for the machine as one rigid body."""
     to = ratios(machine, base)
     J, per_unit, damp = reflected(machine, base), 0.0, 0.0
     for k, driver in enumerate(d.drivers):
@@ -221,7 +221,7 @@ def _play(
 
 
 def _noise(rng: np.random.Generator, s: Setup, need: float) -> Hidden:
-    """White forces on the bodies and counts on the readings, as a quiet machine has them."""
+    """Noise of a quiet machine: white forces on the bodies and counts on the readings."""
     h = Hidden()
     to = ratios(s.machine, s.base)
     level = between(rng, 3e-4, 3e-3)

@@ -1,4 +1,4 @@
-"""Drive from command to force: slew, offset, dead band, gain by sign, limit, supply, heat, lags, bandwidth."""
+"""Drive model from command to force: slew, offset, dead band, gain by sign, limit, supply, heat, lags, bandwidth."""
 
 import numpy as np
 
@@ -9,18 +9,18 @@ from rtctl.proof.machines.forces import dead_zone
 
 @compiled
 def slewed(m, d, u, now, h):
-    """Command after the rate limit, moved on from `now` by `h` s towards `u`."""
+    """Command after the rate limit, advanced from `now` by `h` s towards `u`."""
     top = m.d_slew[d] * h
     if m.d_slew[d] >= ENDLESS:
         return u
-    if m.d_slewsoft[d] > 0.0:  # rate that bends towards its limit
+    if m.d_slewsoft[d] > 0.0:  # smooth rate limit
         return now + top * np.tanh((u - now) / max(m.d_slewsoft[d] * m.d_slew[d], 1e-30))
     return now + min(max(u - now, -top), top)
 
 
 @compiled
 def wanted(m, d, u, heat, drawn, t):
-    """Force of drive `d` (N, Nm; V for a voltage drive) that the command `u` asks for."""
+    """Setpoint of drive `d` (N, Nm; V for a voltage drive) for the command `u`."""
     u, _ = dead_zone(u + m.d_offset[d], m.d_band[d], m.d_bandsoft[d])
     u *= 1.0 + m.d_asym[d] * np.sign(u)
     top = m.d_sat[d]
@@ -38,7 +38,7 @@ def wanted(m, d, u, heat, drawn, t):
 
 @compiled
 def filtered(m, goal, lag, lag2, F, dF, T, h):
-    """Move the drives' lags and bandwidth on by `h` s; T (ND, 2, 2) is the exact transition of the bandwidth."""
+    """Advance the drives' lags and bandwidth by `h` s; T (ND, 2, 2) is the exact transition of the bandwidth."""
     for d in range(ND):
         aim = goal[d]
         if m.d_lag[d] > 0.0:

@@ -1,4 +1,4 @@
-"""Description of a machine (exchange format 2) to the record of the true machine, and the owner's beliefs about it."""
+"""Conversion of a description (exchange format 2) to the record of the true machine, and its nominal values."""
 
 import copy
 import math
@@ -11,8 +11,13 @@ from rtctl.proof.machines import arrays
 
 Json = dict[str, Any]
 EXACT = ("ratio", "limit", "dac_bits", "dac_range", "counts_per_unit", "resolution", "per_unit", "incline", "angle")
-WELL_KNOWN = {"inertia": 0.03, "mass": 0.03, "arm": 0.03, "torque_constant": 0.05}  # share, by the key's last word
-ORDINARY = 0.15  # share
+WELL_KNOWN = {
+    "inertia": 0.03,
+    "mass": 0.03,
+    "arm": 0.03,
+    "torque_constant": 0.05,
+}  # relative tolerance, by the last word of the key
+ORDINARY = 0.15  # relative tolerance of other numbers
 MEASURES = {"position": arrays.POSITION, "speed": arrays.SPEED, "acceleration": arrays.ACCELERATION}
 
 
@@ -23,7 +28,7 @@ def gravities(body: Json) -> list[Json]:
 
 
 def record(machine: Json, Ts: float, delay: float) -> np.ndarray:
-    """Record () of the machine that a description with true values describes, simulated at 50 us or finer."""
+    """Record () of the machine in a description with true values, with a solver step of at most 50 us."""
     m = arrays.neutral()
     m["Ts"], m["delay"], m["sub"] = Ts, delay, max(20.0, math.ceil(Ts / 5e-5 - 1e-9))
     bodies, joints = list(machine["bodies"]), list(machine["joints"])
@@ -78,7 +83,7 @@ def numbers(machine: Json | list[Any], path: str = "") -> Iterator[tuple[str, fl
 
 
 def tolerance(path: str) -> float:
-    """Share by which the owner's value at a dotted path may be wrong."""
+    """Relative tolerance of the nominal value at a dotted path."""
     key = path.rsplit(".", 1)[-1]
     if key in EXACT or key == "noise":
         return 0.0
@@ -86,9 +91,9 @@ def tolerance(path: str) -> float:
 
 
 def believe(machine: Json, rng: np.random.Generator, edge: bool) -> tuple[Json, dict[str, float], dict[str, float]]:
-    """The owner's description, the tolerances of format 2, and the true values of what may be wrong.
+    """Nominal description, tolerances of format 2, and true values of the uncertain numbers.
 
-    Values are within their tolerance of the true ones; with `edge` all stand in its outer fifth.
+    Nominal values are within their tolerance of the true values; with `edge` in its outer fifth.
     """
     owner = copy.deepcopy(machine)
     said: dict[str, float] = {"default": ORDINARY}

@@ -1,7 +1,7 @@
-"""What case number i of a seed holds: kind, effects, sizes, and the order in which machines are tried for it.
+"""Plan of case number i of a seed: kind, effects, sizes, and order of the topologies to try.
 
 A deck of 60 cases: 27 singles (sizes 1, 0.3, 0.1 as 15 to 9 to 3), 7 without missing physics, 5 with parameters at the
-edge of their tolerance, 3 decoys, 9 pairs, 9 of unknown physics. Singles go through every name before one comes again.
+edge of their tolerance, 3 decoys, 9 pairs, 9 of unknown physics. Singles use every name before any repetition.
 """
 
 from collections.abc import Sequence
@@ -26,8 +26,8 @@ DECK: Sequence[tuple[str, float | None]] = (
     + [("unknown", 1.0)] * 9
 )  # fmt: skip
 DECOYS = ("noise_colour", "gust")
-RARE = ("structure.compliance", "sensor.rectified")  # not in pairs: they change what the machine is
-LATE = {"drive.lag", "sensor.lag", "timing.delay", "drive.slew"}  # two of them are one curve
+RARE = ("structure.compliance", "sensor.rectified")  # not in pairs: they change the structure of the machine
+LATE = {"drive.lag", "sensor.lag", "timing.delay", "drive.slew"}  # two of these effects cannot be distinguished
 STEADY = {"drive.offset", "load.gravity", "load.imbalance"}
 DRAG = {"friction.viscous", "drive.back_emf", "friction.quadratic"}
 
@@ -36,13 +36,13 @@ class Plan(NamedTuple):
     kind: str
     size: float | None
     names: tuple[str, ...]
-    topologies: tuple[str, ...]  # in the order in which they are tried
+    topologies: tuple[str, ...]  # in order of trial
     how: str  # rich or production
     decoy: str | None
 
 
 def plan(seed: int, i: int, topologies: tuple[str, ...] = TOPOLOGIES) -> Plan:
-    """Case `i`, counted from 0; depends on the seed, `i` and `topologies` alone."""
+    """Plan of case `i`, counted from 0; depends only on the seed, `i` and `topologies`."""
     block, place = divmod(i, len(DECK))
     order = np.random.default_rng([seed, block, 101]).permutation(len(DECK))
     kind, size = DECK[order[place]]
@@ -66,13 +66,13 @@ def plan(seed: int, i: int, topologies: tuple[str, ...] = TOPOLOGIES) -> Plan:
 
 
 def _in_turn(seed: int, rank: int, names: list[str], stream: int) -> str:
-    """The name with number `rank` when all are dealt out again and again, each time in another order."""
+    """Name number `rank` of a sequence of random permutations of `names`."""
     pack, place = divmod(rank, len(names))
     return names[np.random.default_rng([seed, pack, stream]).permutation(len(names))[place]]
 
 
 def _pair(rng: np.random.Generator) -> tuple[str, str]:
-    """Two names of different families that are not one curve together."""
+    """Two names of different families that can be distinguished."""
     names = [n for n in sorted(TABLE) if n not in RARE]
     while True:
         a, b = (names[k] for k in rng.integers(len(names), size=2))
@@ -81,7 +81,7 @@ def _pair(rng: np.random.Generator) -> tuple[str, str]:
 
 
 def needs(p: Plan) -> frozenset[str]:
-    """What a plan asks of the machine: springs, a rigid joint, two position sensors."""
+    """Requirements of a plan: springs, a rigid joint, two position sensors."""
     out: frozenset[str] = frozenset()
     for name in p.names:
         if name in TABLE:

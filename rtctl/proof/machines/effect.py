@@ -1,7 +1,7 @@
-"""Table of effects: how one is put into the true machine, where it may stand, and what the answers say of it.
+"""Table of effects: change of the true machine, possible nodes, and entries in the answers.
 
-An effect of size 1 is what such machines show; sizes follow the machine's own trajectories without effects, so that
-one rule fits every topology. Each name has two or more forms, of which a library has at most one.
+Size 1 is a typical amplitude. Sizes scale with the machine's trajectories without effects: one rule fits every
+topology. Each name has two or more forms, of which a library has at most one.
 """
 
 import math
@@ -20,7 +20,7 @@ Where = Callable[[Setup], list[str]]
 
 
 class UnfitError(Exception):
-    """The effect cannot show on this machine or in this motion; another machine is drawn."""
+    """Effect invisible on this machine or in this motion; another machine is drawn."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ def effect(name: str, where: Where, axes: tuple[str, ...], *need: str) -> Callab
 
 
 def about(rng: np.random.Generator, value: float, spread: float = 0.35) -> float:
-    """Log-uniform within e^+-spread of a typical value."""
+    """Log-uniform random number within a factor e^+-spread of `value`."""
     return float(value * math.exp(rng.uniform(-spread, spread)))
 
 
@@ -83,7 +83,7 @@ def on_body(s: Setup, *measures: str) -> list[str]:
 
 
 def measure(s: Setup, run: dict[str, np.ndarray]) -> None:
-    """Keep the trajectories of the machine without effects, by which effects are sized."""
+    """Store the trajectories of the machine without effects, the scale of effect sizes."""
     states = run["states"]
     total = np.zeros(s.n)
     for d, drive in enumerate(s.machine["drives"].values()):
@@ -96,7 +96,7 @@ def measure(s: Setup, run: dict[str, np.ndarray]) -> None:
 
 
 def speed(s: Setup, node: str) -> float:
-    """Speed that a body often reaches (90 % quantile)."""
+    """90 % quantile of a body's speed."""
     return max(float(np.quantile(np.abs(s.seen["v"][:, s.body(node)]), 0.9)), 1e-12)
 
 
@@ -105,33 +105,33 @@ def span(s: Setup, node: str) -> float:
 
 
 def level(s: Setup, node: str) -> float:
-    """Force (N, Nm) by which an effect at a body is sized: of its dry friction and of what the drives do."""
+    """Scale of forces (N, Nm) at a body, from its dry friction and the drive forces."""
     g = abs(ratios(s.machine, s.base)[node])
     return max(float(s.m["b_F"][s.body(node)]), 0.18 * float(np.std(s.seen["base_force"])) / g)
 
 
 def inertia_at(s: Setup, node: str) -> float:
-    """Inertia of the whole machine at a body."""
+    """Inertia of the whole machine reflected to a body."""
     return reflected(s.machine, node)
 
 
 def joint_force(s: Setup, node: str) -> float:
-    """Force in a joint (N, Nm): standard deviation."""
+    """Standard deviation of the force in a joint (N, Nm)."""
     return max(float(np.std(s.seen["T"][:, s.joint(node)])), 1e-12)
 
 
 def command(s: Setup, node: str) -> float:
-    """Command of a drive: rms about its mean."""
+    """Standard deviation of the command of a drive."""
     return max(float(np.std(s.seen["command"][:, s.drive(node)])), 1e-12)
 
 
 def crossed(s: Setup, node: str, rng: np.random.Generator) -> float:
-    """A position that the body crosses often."""
+    """Random position that the body crosses often."""
     return float(np.quantile(s.seen["q"][:, s.body(node)], rng.uniform(0.25, 0.75)))
 
 
 def nodes_ok(s: Setup, name: str, node: str) -> set[str]:
-    """Nodes that count as right: the effect does the same to every reading there."""
+    """Nodes that count as right: the effect changes every reading equally there."""
     out = {node}
     if node in s.machine["bodies"]:
         out |= alike(s.machine, node, s.band_hz)
@@ -147,7 +147,7 @@ def nodes_ok(s: Setup, name: str, node: str) -> set[str]:
         out |= set(s.machine["drives"])
     if name in ("drive.offset", "drive.back_emf", "drive.thermal", "ripple.torque") and node in s.machine["drives"]:
         out |= alike(s.machine, s.machine["drives"][node]["body"], s.band_hz)
-    if name in ("drive.supply_sag", "drive.offset"):  # one supply; a constant force acts alike wherever it comes from
+    if name in ("drive.supply_sag", "drive.offset"):  # one supply; a constant force acts equally at any drive
         out |= set(s.machine["drives"])
         out |= {drive["body"] for drive in s.machine["drives"].values()} if name == "drive.offset" else set()
     if name == "structure.resonance":
@@ -163,7 +163,7 @@ def nodes_ok(s: Setup, name: str, node: str) -> set[str]:
 
 
 def names_ok(s: Setup, name: str, node: str) -> set[str]:
-    """The name, and those that are the same physics on this machine."""
+    """The name and its equivalents on this machine."""
     out, linear = {name}, any(not rotary(s.machine, b) for b in bodies(s))
     force = all(drive["kind"] != "voltage" for drive in s.machine["drives"].values())
     driven = {drive["body"] for drive in s.machine["drives"].values()}

@@ -1,4 +1,4 @@
-"""Drives and the loop's time: offset, dead band, gain, limit, lag, heat, supply, back-EMF, slew, commutation, delay."""
+"""Effects of drives and loop timing: offset, dead band, gain, limit, lag, heat, supply, back-EMF, slew, delay."""
 
 import math
 
@@ -40,7 +40,7 @@ def offset(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
 
 @effect("drive.deadband", drives, ("command",))
 def deadband(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
-    """No output around zero; hard or rounded edges. The band is where the output begins."""
+    """Dead band around zero with hard or rounded edges; its size is the command at which the output begins."""
     d, band = s.drive(node), about(rng, 0.35 * command(s, node)) * size
     s.m["d_band"][d], s.m["d_bandsoft"][d] = band, (0.0, 0.3 * band)[form(rng, 2)]
     return {"band": band}
@@ -55,7 +55,7 @@ def asymmetry(s: Setup, node: str, size: float, rng: np.random.Generator) -> Siz
 
 @effect("drive.saturation", drives, ("command",))
 def saturation(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
-    """Output limited below the command's limit: sharp, or bent."""
+    """Saturation of the output below the command's limit: hard or smooth."""
     d = s.drive(node)
     top = float(np.quantile(np.abs(s.seen["command"][:, d]), 1.0 - about(rng, 0.03) * size))
     s.m["d_sat"][d], s.m["d_satsoft"][d] = top, (0.0, 0.15)[form(rng, 2)]
@@ -64,7 +64,7 @@ def saturation(s: Setup, node: str, size: float, rng: np.random.Generator) -> Si
 
 @effect("drive.lag", drives, RESPONSE)
 def lag(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
-    """First order, or two in a row."""
+    """Lag of the drive: first order, or two in series."""
     d, tau = s.drive(node), about(rng, 4e-3) * size
     if form(rng, 2):
         s.m["d_lag"][d] = tau
@@ -75,7 +75,7 @@ def lag(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
 
 @effect("drive.thermal", drives, ("time",))
 def thermal(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
-    """Gain that falls with the heat of the current squared, or dry friction that falls while the machine runs."""
+    """Gain that falls with the heat of the squared current, or dry friction that falls with running time."""
     d = s.drive(node)
     tau = about(rng, 0.4 * s.n * s.Ts)
     i = s.body(_body(s, node))
@@ -89,7 +89,7 @@ def thermal(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes
 
 @effect("drive.supply_sag", drives, ("command", "time"))
 def sag(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
-    """Gain that falls as all drives draw more: at once, or with the supply's time constant."""
+    """Gain that falls with the total current of all drives: at once, or with the supply's time constant."""
     for d in range(int(s.m["nd"])):
         s.m["d_sagref"][d] = max(float(np.quantile(np.abs(s.seen["forces"][:, d]), 0.98)), 1e-12) * float(s.m["nd"])
     s.m["d_sag"][:] = about(rng, 0.3) * size
@@ -113,7 +113,7 @@ def back_emf(s: Setup, node: str, size: float, rng: np.random.Generator) -> Size
 
 @effect("drive.slew", drives, ("command", "time"))
 def slew(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
-    """Rate limit of the command: sharp, or one that bends towards its limit."""
+    """Rate limit of the command: hard or smooth."""
     d = s.drive(node)
     rate = np.abs(np.diff(s.seen["command"][:, d])) / s.Ts
     s.m["d_slew"][d] = max(float(np.quantile(rate, 1.0 - min(about(rng, 0.35) * size, 0.8))), 1e-9)
@@ -142,7 +142,7 @@ def commutation(s: Setup, node: str, size: float, rng: np.random.Generator) -> S
 
 @effect("timing.delay", loop, RESPONSE)
 def delay(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
-    """More delay than the case says, in quarters of a tick."""
+    """Delay beyond the delay of the case, in quarters of a tick."""
     extra = max(round(4.0 * about(rng, 4e-3) * size / s.Ts) / 4.0, 0.25)
     s.m["delay"] += extra
     return {"extra_samples": extra}

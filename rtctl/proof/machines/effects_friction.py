@@ -1,4 +1,4 @@
-"""Friction of bodies: dry, viscous, falling, before sliding, by direction, load, position, and drag."""
+"""Friction effects of bodies: dry, viscous, Stribeck, presliding, by direction, load, position, and drag."""
 
 import math
 
@@ -25,7 +25,7 @@ from rtctl.proof.machines.kinematics import rotary
 
 @effect("friction.coulomb", bodies, ("velocity",))
 def coulomb(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
-    """More dry friction than the tolerance allows; or the same spread over bristles of several lengths."""
+    """Dry friction beyond the tolerance, in one bristle or spread over bristles of several lengths."""
     i = s.body(node)
     added = about(rng, 0.7 * level(s, node)) * size
     s.m["b_F"][i] += added
@@ -43,7 +43,7 @@ def viscous(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes
 
 @effect("friction.stribeck", bodies, ("velocity",))
 def stribeck(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
-    """Friction that falls with speed: Gaussian, exponential or as a rational function."""
+    """Stribeck friction: Gaussian, exponential or rational fall with speed."""
     i = s.body(node)
     top, v_s = about(rng, 0.9 * level(s, node)) * size, about(rng, 0.12 * speed(s, node), 0.6)
     s.m["b_Fs"][i], s.m["b_vs"][i], s.m["b_fall"][i] = top, v_s, float(form(rng, 3))
@@ -53,7 +53,7 @@ def stribeck(s: Setup, node: str, size: float, rng: np.random.Generator) -> Size
 
 @effect("friction.presliding", bodies, ("position", "velocity", "angle"))
 def presliding(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
-    """Bristles that bend visibly: Dahl's, or several of different lengths."""
+    """Visible presliding: Dahl bristle, or several bristles of different lengths."""
     i = s.body(node)
     s.m["b_F"][i] = max(float(s.m["b_F"][i]), 0.3 * level(s, node))
     w, J = 2.0 * math.pi * about(rng, 7.0), inertia_at(s, node)
@@ -71,7 +71,7 @@ def asymmetry(s: Setup, node: str, size: float, rng: np.random.Generator) -> Siz
     kind, F = form(rng, 3), 0.8 * level(s, node)
     by_speed = float(s.m["b_B"][i]) * speed(s, node)
     dry = min(about(rng, F / max(float(s.m["b_F"][i]), 1e-12)), 0.9) * size * sign(rng) if kind != 1 else 0.0
-    share = min(about(rng, F / max(by_speed, 1e-12)), 0.9) * size * sign(rng) if kind != 0 else 0.0  # it never pushes
+    share = min(about(rng, F / max(by_speed, 1e-12)), 0.9) * size * sign(rng) if kind != 0 else 0.0  # never drives
     if abs(dry) * float(s.m["b_F"][i]) + abs(share) * by_speed < 0.2 * F * size:
         raise UnfitError("too little friction for an asymmetry of it")
     B = share * float(s.m["b_B"][i])
@@ -80,14 +80,14 @@ def asymmetry(s: Setup, node: str, size: float, rng: np.random.Generator) -> Siz
 
 
 def _loaded(s: Setup) -> list[str]:
-    """Bodies at the end of a spring, or that carry gravity."""
+    """Bodies at the end of a spring, or under gravity."""
     out = {e for j in s.machine["joints"].values() if "stiffness" in j for e in (j["from"], j["to"])}
     return [b for b in bodies(s) if b in out or "gravity" in s.machine["bodies"][b]]
 
 
 @effect("friction.load", _loaded, ("tension", "velocity", "position"))
 def by_load(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
-    """Friction in proportion to the forces in the body's joints, or to the gravity load that it carries."""
+    """Friction proportional to the forces in the body's joints, or to its gravity load."""
     i = s.body(node)
     ends = [(name, j) for name, j in s.machine["joints"].items() if node in (j["from"], j["to"]) and "stiffness" in j]
     forces = [joint_force(s, n) * (1.0 if j["to"] == node else abs(j["ratio"])) for n, j in ends]
@@ -108,7 +108,7 @@ def by_load(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes
 
 @effect("friction.quadratic", bodies, ("velocity",))
 def quadratic(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
-    """Drag by the square of speed, or by a power near it."""
+    """Drag proportional to the square of speed, or to a power near 2."""
     i, power = s.body(node), (2.0, 1.8)[form(rng, 2)]
     c = about(rng, 1.1 * level(s, node) / speed(s, node) ** power) * size
     s.m["b_quad"][i], s.m["b_power"][i] = c, power
@@ -117,11 +117,11 @@ def quadratic(s: Setup, node: str, size: float, rng: np.random.Generator) -> Siz
 
 @effect("friction.position", bodies, ("position", "angle"))
 def by_position(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
-    """Dry friction that changes along the way: a wave, a step that is rounded, a worn spot."""
+    """Dry friction by position: a wave, a rounded step, or a worn spot."""
     i, kind = s.body(node), form(rng, 3)
     F, wide = about(rng, 1.1 * level(s, node)) * size, span(s, node)
     low = float(s.seen["q"][:, i].min())
-    if rotary(s.machine, node) and wide > 12.0:  # many turns: once a turn
+    if rotary(s.machine, node) and wide > 12.0:  # many turns: period of one turn
         kind, width = 0, 1.0
     else:
         width = (wide / about(rng, 8.0), 0.2 * wide, about(rng, 0.12 * wide))[kind]

@@ -1,4 +1,4 @@
-"""Joints and what hangs on bodies: backlash, hysteresis, slip, creep, transmission error, stiffness, compliance."""
+"""Effects of joints and attached masses: backlash, hysteresis, slip, creep, transmission error, compliance."""
 
 import math
 
@@ -25,13 +25,13 @@ from rtctl.proof.machines.kinematics import joint_hz, rotary
 
 
 def bend(s: Setup, node: str) -> float:
-    """Deflection of a spring (m or rad): standard deviation."""
+    """Standard deviation of the deflection of a spring (m or rad)."""
     return joint_force(s, node) / float(s.m["j_k"][s.joint(node)])
 
 
 @effect("transmission.backlash", springs, ("velocity", "command", "tension", "position"), ELASTIC)
 def backlash(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
-    """Gap with hard or rounded edges; in a joint whose force changes its sign."""
+    """Backlash with hard or rounded edges, in a joint with a force of both signs."""
     j = s.joint(node)
     T = s.seen["T"][:, j]
     if min(np.mean(T > 0.0), np.mean(T < 0.0)) < 0.05:
@@ -44,7 +44,7 @@ def backlash(s: Setup, node: str, size: float, rng: np.random.Generator) -> Size
 
 @effect("transmission.hysteresis", springs, ("tension", "position", "velocity"), ELASTIC)
 def hysteresis(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
-    """Loss by deflection: Dahl's, or sliding elements of several lengths (Iwan)."""
+    """Hysteresis of a joint: Dahl, or sliding elements of several lengths (Iwan)."""
     j = s.joint(node)
     H = about(rng, 0.5 * joint_force(s, node)) * size
     z0 = about(rng, 0.6 * bend(s, node))
@@ -55,7 +55,7 @@ def hysteresis(s: Setup, node: str, size: float, rng: np.random.Generator) -> Si
 
 @effect("transmission.slip", springs, ("tension", "time", "command"), ELASTIC)
 def slip(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
-    """Sliding past a limit: dry, or with a speed that grows beyond it."""
+    """Slip above a force limit: dry, or with a speed that grows above the limit."""
     j = s.joint(node)
     T = np.abs(s.seen["T"][:, j])
     if abs(float(np.mean(s.seen["T"][:, j]))) > 1.0 * joint_force(s, node):
@@ -68,7 +68,7 @@ def slip(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
 
 @effect("transmission.creep", springs, ("tension", "time", "position"), ELASTIC)
 def creep(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
-    """Slow sliding in proportion to force, with the way that runs through or with time."""
+    """Creep proportional to force, per travel or per time."""
     j, joint = s.joint(node), s.machine["joints"][node]
     T, way = joint_force(s, node), span(s, joint["to"])
     v = float(np.mean(np.abs(s.seen["v"][:, s.body(joint["to"])])))
@@ -107,7 +107,7 @@ def ratio(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
 
 @effect("structure.stiffening", springs, ("tension", "position"), ELASTIC)
 def stiffening(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
-    """Stiffness that grows by a power of the deflection, or exponentially."""
+    """Stiffness that grows with a power of the deflection, or exponentially."""
     j = s.joint(node)
     power = (2.0, 1.0, 0.0)[form(rng, 3)]
     e0, beta = about(rng, 1.5 * bend(s, node)), about(rng, 1.2) * size
@@ -121,7 +121,7 @@ def _stiff(s: Setup) -> list[str]:
 
 @effect("structure.compliance", _stiff, ("frequency", "tension"), RIGID)
 def compliance(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
-    """Spring where the owner sees none: linear, or softer when it is little bent."""
+    """Compliance of a nominally rigid joint: linear, or softer at small deflections."""
     j, joint = s.joint(node), s.machine["joints"][node]
     n, near = joint["ratio"], float(s.m["b_J"][s.body(joint["from"])])
     near, far = near / n**2, float(s.m["b_J"][s.body(joint["to"])])
@@ -138,7 +138,7 @@ def compliance(s: Setup, node: str, size: float, rng: np.random.Generator) -> Si
 
 @effect("structure.resonance", bodies, ("frequency",))
 def resonance(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
-    """A mass on a spring at the body; the spring linear, or one that stiffens."""
+    """Resonance: a mass on a linear or hardening spring at the body."""
     i = s.body(node)
     f = about(rng, min(0.45 * s.band_hz, 30.0))
     added, w = about(rng, 0.3) * size * inertia_at(s, node), 2.0 * math.pi * f
@@ -154,7 +154,7 @@ def resonance(s: Setup, node: str, size: float, rng: np.random.Generator) -> Siz
 
 @effect("load.inertia", rotary_bodies, ("angle", "position"))
 def inertia(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
-    """Inertia over the angle of a crank or linkage: once or twice a turn."""
+    """Inertia that varies with the angle of a crank or linkage, once or twice a turn."""
     i = s.body(node)
     share = inertia_at(s, node) / float(s.m["b_J"][i])
     a = min(about(rng, 0.45 * share), 0.8) * size

@@ -1,4 +1,4 @@
-"""Forces by position at bodies: cogging, imbalance, springs, bumps, gravity that the owner left out."""
+"""Effects of forces by position at bodies: cogging, imbalance, springs, bumps, undescribed gravity."""
 
 import math
 
@@ -38,20 +38,20 @@ def cogging(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes
 
 @effect("load.imbalance", rotary_bodies, ("angle", "position"))
 def imbalance(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
-    """Gravity on a mass off the centre: a torque of one period a turn, at an angle nobody knows."""
+    """Imbalance under gravity: a torque with one period per turn and unknown angle."""
     if span(s, node) < 1.2:
         raise UnfitError("less than a fifth of a turn")
     i, A = s.body(node), about(rng, 1.1 * level(s, node)) * size
     angle = rng.uniform(-math.pi, math.pi)
     if "gravity" in s.machine["bodies"][node] and abs(math.sin(angle)) < 0.5:
-        angle = math.pi / 2.0  # else it is a wrong mass or arm
+        angle = math.pi / 2.0  # other angles equal a wrong mass or arm
     s.m["b_im"][i], s.m["b_ima"][i] = A, angle
     return {"amplitude": A, "angle": angle}
 
 
 @effect("load.gravity", bodies, ("position", "angle", "time", "command"))
 def gravity(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
-    """Gravity that the description lacks: a mass that hangs, or an incline."""
+    """Gravity missing in the description: a hanging mass, or an incline."""
     i = s.body(node)
     if "gravity" in s.machine["bodies"][node]:
         raise UnfitError("gravity of this body is described")
@@ -68,7 +68,7 @@ def gravity(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes
 
 @effect("load.spring", bodies, ("position",))
 def spring(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
-    """Force that grows with the way: linear, hardening, or one that saturates (a cable chain)."""
+    """Spring force by position: linear, hardening, or saturating (a cable chain)."""
     i, wide = s.body(node), span(s, node)
     if rotary(s.machine, node) and wide > 400.0:
         raise UnfitError("a spindle has no spring")
@@ -84,7 +84,7 @@ def spring(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
 
 @effect("load.bump", bodies, ("position", "angle"))
 def bump(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
-    """A force at one position: bell-shaped, or with ends."""
+    """Local force at one position: bell-shaped, or with finite width."""
     i, wide = s.body(node), span(s, node)
     if rotary(s.machine, node) and wide > 400.0:
         raise UnfitError("a spindle passes one position once")

@@ -1,4 +1,4 @@
-"""Sensors: a wrong scale, errors over a turn, missed counts, lag, readings without a direction."""
+"""Effects of sensors: scale error, error over a turn, missed counts, lag, readings without sign."""
 
 import math
 
@@ -32,7 +32,7 @@ def _second(s: Setup) -> list[str]:
 
 @effect("sensor.scale", _second, ("position",), TWO)
 def scale(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
-    """A constant factor in one of two readings."""
+    """Scale error: a constant factor in one of two readings."""
     a = sign(rng) * about(rng, 0.012) * size
     s.m["s_rel"][s.sensor(node)] = 1.0 + a
     return {"relative": a}
@@ -40,7 +40,7 @@ def scale(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
 
 @effect("ripple.encoder", _turning, ("angle", "position"))
 def ripple(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
-    """Reading error over a turn: once a turn, or three harmonics."""
+    """Periodic reading error over a turn: first harmonic, or three harmonics."""
     k, sensor = s.sensor(node), s.machine["sensors"][node]
     wide = span(s, sensor["body"])
     n = 1.0 if wide > 7.0 else float(math.ceil(9.0 / max(wide, 1e-9)))
@@ -61,7 +61,7 @@ def ripple(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
 
 @effect("sensor.missed_counts", _counters, ("time", "velocity"))
 def missed(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
-    """Counts lost in single events: lost and gained, or lost alone."""
+    """Single events of lost counts: lost and gained, or only lost."""
     k = s.sensor(node)
     counts = float(max(round(about(rng, 25.0) * math.sqrt(size)), 4))
     s.hidden.lost[k], s.hidden.lost_rate[k] = counts, about(rng, 6.0 / (s.n * s.Ts))
@@ -71,7 +71,7 @@ def missed(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
 
 @effect("sensor.lag", _readings, ("frequency", "time"))
 def lag(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
-    """Filter in the reading: first order, or two in a row."""
+    """Lag of the reading: first order, or two in series."""
     k, sensor = s.sensor(node), s.machine["sensors"][node]
     tau = about(rng, 0.02 if sensor["measures"] == "speed" else 6e-3) * size
     if form(rng, 2):
@@ -87,7 +87,7 @@ def _not_in_the_loop(s: Setup) -> list[str]:
 
 @effect("sensor.rectified", _not_in_the_loop, ("velocity", "position"), TWO)
 def rectified(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
-    """A counter that counts up in both directions, or a speed without a sign."""
+    """Rectified reading: a counter that counts up in both directions, or a speed without sign."""
     k, sensor = s.sensor(node), s.machine["sensors"][node]
     if sensor["measures"] == "position" and "counts_per_unit" not in sensor:
         raise UnfitError("a number of a position has a sign")

@@ -1,4 +1,4 @@
-"""Forces by position, joints, and the accelerations that follow.
+"""Forces by position, joint forces, and resulting accelerations.
 
 State: coordinates (NB), their speeds (NB), currents of the voltage drives (ND), relaxing springs (NB).
 """
@@ -14,7 +14,7 @@ QV, QI, QR, NX = NB, 2 * NB, 2 * NB + ND, 3 * NB + ND
 
 @compiled
 def gravity(m, i, q):
-    """Gravity force (N or Nm) at position `q`: the described one and the one that the description lacks."""
+    """Gravity force (N or Nm) at position `q`: the described part and the part missing in the description."""
     f = -m.b_gc[i] - m.b_gxc[i]
     for g in range(NG):
         if m.b_g[i, g] != 0.0:
@@ -68,7 +68,7 @@ def dead_zone(e, half, soft):
 
 @compiled
 def stretch(m, j, qa, qb, va, vb):
-    """Elongation of joint `j`, its rate, and how a unit of force acts on the two ends."""
+    """Elongation of joint `j`, its rate, and the lever ratios of the two ends."""
     e, de = qb - m.j_n[j] * qa, vb - m.j_n[j] * va
     on_a, on_b = m.j_n[j], -1.0
     for h in range(NH):
@@ -90,7 +90,7 @@ def stretch(m, j, qa, qb, va, vb):
 
 @compiled
 def elastic(m, j, x, t, loose):
-    """Elastic force of joint `j` at deflection `x` (slip and gap taken off), and its contact 0 to 1."""
+    """Elastic force of joint `j` at deflection `x` (without slip and gap), and its contact 0 to 1."""
     y, contact = dead_zone(x, 0.5 * m.j_gap[j], m.j_soft[j])
     k = m.j_k[j]
     if m.j_beta[j] != 0.0:
@@ -106,7 +106,7 @@ def elastic(m, j, x, t, loose):
 
 @compiled
 def hysteresis(m, j, de, z):
-    """Force of the rate-free loss of joint `j` after a further deflection `de`; `z` (NE,) is moved on in place."""
+    """Rate-independent hysteresis force of joint `j` after a further deflection `de`; updates `z` (NE,) in place."""
     H, z0 = m.j_H[j], m.j_z0[j]
     if m.j_Hlaw[j] == 1.0:
         top = z0 if de > 0.0 else -z0
@@ -123,11 +123,11 @@ def hysteresis(m, j, de, z):
 
 @compiled
 def rate(m, x, t, q0, e0, z, zj, xs, loose, force, push, spot, dx, T, zt, acc):
-    """Fill dx (NX,) at state `x`; also T (NJ,) joint forces and acc (NB,) accelerations of the bodies.
+    """State derivative: fills dx (NX,) at state `x`, T (NJ,) with joint forces, acc (NB,) with body accelerations.
 
-    q0 (NB,), e0 (NJ,): positions and elongations at the step's begin, where the memories z (NB, NE), zj (NJ, NE) hold.
-    xs, loose (NJ,): slipped way and looseness. force (ND,): of the drives, for voltage drives the voltage. push, spot
-    (NB,): noise and dry friction that comes and goes. zt (NE,): scratch.
+    q0 (NB,), e0 (NJ,): positions and elongations at the start of the step, the time of the memories z (NB, NE) and zj
+    (NJ, NE). xs, loose (NJ,): slip and looseness. force (ND,): drive forces, voltages for voltage drives. push, spot
+    (NB,): noise and intermittent dry friction. zt (NE,): scratch.
     """
     nb, nj, nd = int(m.nb), int(m.nj), int(m.nd)
     F, M = acc, dx[QV : QV + NB]

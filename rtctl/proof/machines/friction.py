@@ -1,7 +1,7 @@
-"""Friction of a body to the frame: dry with bristles, viscous, drag, and the forms that a library may not have.
+"""Friction of a body against the frame: dry with bristles, viscous, drag, and forms beyond a usual library.
 
-Dry friction is elastic below a bristle's travel and slides beyond it, so that a machine at rest stands still without
-a dead zone in speed. `dq` is the way since the last whole step; `z` is the bristle's deflection there.
+Dry friction is elastic below a bristle's travel and slides beyond it: a machine at rest stands still without a dead
+zone in speed. `dq` is the displacement since the last whole step; `z` is the bristle's deflection at that step.
 """
 
 import numpy as np
@@ -12,7 +12,7 @@ from rtctl.proof.machines.compiled import compiled
 
 @compiled
 def level(m, i, q, v, load, carried, t, spot):
-    """Dry friction (N or Nm, >= 0) at speed `v` before its asymmetry."""
+    """Level of dry friction (N or Nm, >= 0) at speed `v`, without asymmetry."""
     F = m.b_F[i]
     if m.b_Fs[i] != 0.0:
         r = abs(v) / m.b_vs[i]
@@ -44,7 +44,7 @@ def level(m, i, q, v, load, carried, t, spot):
 
 @compiled
 def dry(m, i, F, v, dq, z):
-    """Dry friction at way `dq` since the step began; `z` (NE,) is moved on in place."""
+    """Dry friction (N or Nm) at displacement `dq` since the start of the step; updates `z` (NE,) in place."""
     up, down = F * (1.0 + m.b_as[i]), F * (1.0 - m.b_as[i])
     law = m.b_law[i]
     sigma = m.b_sigma[i]
@@ -67,7 +67,7 @@ def dry(m, i, F, v, dq, z):
 
 @compiled
 def steady(m, i, v, other):
-    """Friction that depends on speed alone: viscous, drag, and unknown brakes; `other` is another body's speed."""
+    """Friction (N or Nm) by speed alone: viscous, drag, and unknown brakes; `other` is another body's speed."""
     f = m.b_B[i] * v + m.b_Bas[i] * abs(v)
     if m.b_quad[i] != 0.0:
         f += m.b_quad[i] * np.sign(v) * abs(v) ** m.b_power[i]

@@ -1,6 +1,6 @@
-"""Concealed cases of described machines: draw, simulate with and without effects, write the bundle, keep the answer.
+"""Generation of concealed cases of described machines: draw, simulation with and without effects, bundle, answer.
 
-A case depends on (seed, number, topologies) alone. The same noise acts with and without the effects; `ratio` is the rms
+A case depends only on (seed, number, topologies). Equal noise acts with and without the effects. `ratio` is the rms
 change over the noise floor, of the channel where it is largest.
 """
 
@@ -21,17 +21,17 @@ from rtctl.proof.machines.setup import Setup
 from rtctl.proof.machines.simulate import HIDDEN, Run, channels, floors, healthy, largest, simulate, visibility
 from rtctl.proof.machines.unknown import UNKNOWN
 
-ATTEMPTS, DRAWS = 5, 120  # machines that are simulated, and machines that are drawn, for one case
-WANT = {"unknown": 6.0}  # ratio that a case should reach, else 4, or 1 at a tenth of the size
+ATTEMPTS, DRAWS = 5, 120  # most simulated machines, and most drawn machines, for one case
+WANT = {"unknown": 6.0}  # least ratio of a case by kind; else 4, or 1 at a tenth of the size
 
 Json = dict[str, Any]
 Found = tuple[float, Setup, Run, Json]  # worst ratio, setup, recording, answer
 
 
 def sound(p: draw.Plan, topology: str, seed: list[int]) -> tuple[Setup, Run, Run, int] | None:
-    """A machine without missing physics that can hold the plan's effects, and its run with two noises.
+    """Machine without missing physics for the plan's effects, its runs with two noise seeds, and gain reductions.
 
-    The loop's gain is lowered until it holds. None where it does not, or where an effect has no place.
+    The gain of the loop is reduced until it works. None where it never works, or where an effect has no node.
     """
     rng = np.random.default_rng(seed)
     s = build.sound(topology, rng, p.how, draw.needs(p), p.kind == "parameters")
@@ -56,15 +56,15 @@ def _where(name: str, s: Setup) -> list[str]:
 
 
 def _quiet(s: Setup, a: Run, b: Run) -> bool:
-    """The loop does not chatter: two noises give nearly the same readings."""
+    """Whether the loop does not chatter: two noise seeds give nearly equal readings."""
     floor = floors(s, a, b)
     return all(floor[c] < max(12.0 * quantum, 1.5e-3 * float(np.std(a[c]))) for c, quantum in s.columns)
 
 
 def put(s: Setup, p: draw.Plan, seed: list[int], size: float, leave: int = -1) -> tuple[Setup, list[Json]]:
-    """A copy of the machine with the plan's effects but number `leave`, and what the answers say of each.
+    """Copy of the machine with the plan's effects without number `leave`, and their entries in the answers.
 
-    Raises UnfitError where an effect cannot show on this machine.
+    Raises UnfitError where an effect is invisible on this machine.
     """
     s, said = copy.deepcopy(s), []
     for k, name in enumerate(p.names):
@@ -120,7 +120,7 @@ def carry_out(p: draw.Plan, seed: list[int]) -> tuple[Setup, Run, Json]:
 
 
 def conceal(p: draw.Plan, base: Setup, a: Run, floor: dict[str, float], root: list[int], lowered: int) -> Found | None:
-    """The plan's effects in a machine whose run is `a`, or None where the loop does not hold with them."""
+    """Case with the plan's effects in a machine with run `a`; None where the loop then fails."""
     if p.decoy == "gust":
         i = base.body(base.base)
         base.hidden.gust[i] = 1.5 * level(base, base.base)
@@ -151,7 +151,7 @@ def answer(
     p: draw.Plan, s: Setup, said: list[Json], run: Run, floor: dict[str, float], seen: dict[str, dict[str, float]],
     lowered: int,
 ) -> Json:  # fmt: skip
-    """One entry of answers.json, with the keys of the practice answers; numbers rounded to six digits."""
+    """Entry of answers.json, with the keys of the practice answers; numbers rounded to six digits."""
     rms = {c: float(np.sqrt(np.mean(run[c] ** 2))) for c in channels(s)}
     main = s.columns[s.sensor(s.control)][0]
     out: Json = {
@@ -169,12 +169,12 @@ def answer(
 
 
 def rounded(value: float) -> float:
-    """Six digits."""
+    """Value rounded to six digits."""
     return float(f"{value:.6g}")
 
 
 def write_bundle(folder: Path, s: Setup, run: Run) -> None:
-    """recording.parquet and case.json; counters as 32-bit integers."""
+    """Write recording.parquet and case.json; counters as 32-bit integers."""
     import pyarrow as pa
 
     from rtctl.trace.bundle import save_case, write_parquet
@@ -188,7 +188,7 @@ def write_bundle(folder: Path, s: Setup, run: Run) -> None:
 
 
 def write_case(folder: Path, seed: int, i: int, topologies: tuple[str, ...], heldout: bool) -> tuple[str, Json]:
-    """Generate and write case `i` (from 0); returns its name and its answer. `heldout` plays it another motion too."""
+    """Generate and write case `i` (from 0); returns its name and answer. `heldout` adds a second motion."""
     s, run, said = make(seed, i, topologies)
     name = f"case-{i + 1:04d}"
     write_bundle(folder / name, s, run)
@@ -208,9 +208,9 @@ def generate(
     folder: Path | str, count: int, seed: int, topologies: tuple[str, ...] = TOPOLOGIES,
     progress: Progress | None = None, jobs: int = 1, heldout: bool = False,
 ) -> Path:  # fmt: skip
-    """Write `count` cases, their answers and the seal into `folder`, and return it. Goes on where it was stopped.
+    """Write `count` cases, their answers and the seal into `folder`, and return it. Continues an interrupted run.
 
-    Raises UserError for a folder that holds cases already, for no cases and for an unknown topology.
+    Raises UserError for a folder with cases, for `count` 0 and for an unknown topology.
     """
     bad = [t for t in topologies if t not in TOPOLOGIES]
     if bad or not topologies:

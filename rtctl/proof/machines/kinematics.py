@@ -1,4 +1,4 @@
-"""Kinematic ratios, reflected inertia and stiff joints of a description, for sizing and for equal nodes."""
+"""Kinematic ratios, reflected inertia and stiff joints of a description, for sizing and equivalent nodes."""
 
 import math
 from typing import Any
@@ -11,13 +11,13 @@ def rotary(machine: Json, body: str) -> bool:
 
 
 def inertia(machine: Json, body: str) -> float:
-    """kg m^2 or kg."""
+    """Inertia of a body in kg m^2 or kg."""
     b = machine["bodies"][body]
     return float(b.get("inertia", b.get("mass", 0.0)))
 
 
 def ratios(machine: Json, base: str) -> dict[str, float]:
-    """Units of each body's coordinate for a unit of `base`, all joints held stiff."""
+    """Ratio of each body's coordinate to that of `base`, with rigid joints."""
     out = {base: 1.0}
     for _ in machine["bodies"]:
         for joint in machine["joints"].values():
@@ -30,12 +30,12 @@ def ratios(machine: Json, base: str) -> dict[str, float]:
 
 
 def reflected(machine: Json, base: str) -> float:
-    """Inertia of the whole machine at `base`, kg m^2 or kg."""
+    """Inertia of the whole machine reflected to `base`, kg m^2 or kg."""
     return sum(g * g * inertia(machine, name) for name, g in ratios(machine, base).items())
 
 
 def joint_hz(machine: Json, name: str) -> float:
-    """Frequency of the mode in which the two sides of a joint swing against each other; inf for a rigid joint."""
+    """Frequency in Hz of the mode of the two sides of a joint against each other; inf for a rigid joint."""
     joint = machine["joints"][name]
     if "stiffness" not in joint:
         return math.inf
@@ -50,7 +50,7 @@ def joint_hz(machine: Json, name: str) -> float:
 
 
 def _beyond(machine: Json, cut: str, start: str) -> set[str]:
-    """Bodies that are reached from `start` without the joint `cut`."""
+    """Bodies connected to `start` without the joint `cut`."""
     out = {start}
     for _ in machine["bodies"]:
         for name, joint in machine["joints"].items():
@@ -60,13 +60,12 @@ def _beyond(machine: Json, cut: str, start: str) -> set[str]:
 
 
 def measured(machine: Json) -> set[str]:
-    """Bodies with a sensor of their own."""
+    """Bodies with a sensor."""
     return {s["body"] for s in machine["sensors"].values() if "body" in s}
 
 
 def alike(machine: Json, body: str, band_hz: float) -> set[str]:
-    """Bodies at which a force does the same to every reading: behind joints far above the excitation, of which one
-    end has no sensor."""
+    """Bodies equivalent to `body` for a force, behind joints with modes far above `band_hz` and a sensorless end."""
     out, known = {body}, measured(machine)
     for _ in machine["bodies"]:
         for name, joint in machine["joints"].items():

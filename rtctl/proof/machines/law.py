@@ -1,4 +1,4 @@
-"""Controller: PID on a position, or PI on a speed, shared out to the drives with a preload; or a played command."""
+"""Controller: PID on a position, or PI on a speed, for several drives with a preload; or a recorded command."""
 
 from typing import Any
 
@@ -22,7 +22,7 @@ def law_record(pre: tuple[float, ...] = (0.0,), share: tuple[float, ...] = (1.0,
 
 @compiled
 def law_tick(law, s, settle, ref, w, y, u):
-    """One tick: readings `y` in quanta and reference in, commands out in `u` (ND,). `s` (4,) is the law's memory."""
+    """One tick: readings `y` in quanta and reference in, commands out in `u` (ND,). `s` (4,) is its state."""
     Ts = law.Ts
     if law.file != 0.0:
         uc = 0.0

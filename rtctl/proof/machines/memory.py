@@ -1,4 +1,4 @@
-"""What has a memory beyond the differential equations, and the states in which dry friction and joints are."""
+"""States outside the differential equations, and discrete modes of dry friction and joints."""
 
 import numpy as np
 
@@ -19,7 +19,7 @@ def joint_begin(m, x, e0):
 
 @compiled
 def remember(m, x, t, h, q0, e0, z, zj, xs, loose, last, spot, T):
-    """Move on what has a memory beyond the differential equations: bristles, hysteresis, slip, creep, loose screws."""
+    """Update the states outside the differential equations: bristles, hysteresis, slip, creep, loose screws."""
     for j in range(int(m.nj)):
         if m.j_rigid[j] != 0.0:
             continue
@@ -51,9 +51,9 @@ def remember(m, x, t, h, q0, e0, z, zj, xs, loose, last, spot, T):
 
 @compiled
 def modes(m, x, t, q0, e0, z, xs, loose, T, spot, mode):
-    """Whether a state changed since the last call: a body holds or slides, a joint touches, slips or bends back.
+    """Whether a mode changed since the last call: a body sticks or slides, a joint is in contact, slips or reverses.
 
-    mode (NB + NJ,) is moved on in place. Call before `remember`, with the arguments of `rate`.
+    Updates mode (NB + NJ,) in place. Call before `remember`, with the arguments of `rate`.
     """
     changed = False
     for i in range(int(m.nb)):
@@ -104,7 +104,7 @@ def joint_load(m, i, T):
 
 @compiled
 def carried(m, i, q):
-    """Gravity load that the friction of body `i` grows with, N or Nm."""
+    """Gravity load on the friction of body `i`, N or Nm."""
     if m.b_mu_g[i] == 0.0:
         return 0.0
     return abs(gravity(m, i, q))

@@ -1,4 +1,4 @@
-"""Sensors: what they measure, in quanta of their column, before it is whole."""
+"""Sensor readings in quanta of their columns, before rounding."""
 
 import numpy as np
 
@@ -41,6 +41,6 @@ def measured(m, s, x, T, acc, force):
 
 @compiled
 def raw(m, s, x, T, acc, force, u):
-    """Reading of sensor `s` in quanta, not yet rounded; `u` is the command that leaks in."""
+    """Reading of sensor `s` in quanta, before rounding; `u` is the command, for crosstalk."""
     value = m.s_rel[s] * measured(m, s, x, T, acc, force)
     return m.s_phase[s] + m.s_gain[s] * value + m.s_cross[s] * u

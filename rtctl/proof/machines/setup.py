@@ -1,4 +1,4 @@
-"""One case before it is simulated: true machine, owner's case, law, motion, noise; and the arrays of one noise seed."""
+"""Setup of one case for the simulation: true machine, case, law, motion, noise; and arrays of one noise seed."""
 
 import math
 from collections.abc import Callable
@@ -15,7 +15,7 @@ Play = Callable[[np.random.Generator], tuple[np.ndarray, np.ndarray]]
 
 @dataclass
 class Hidden:
-    """What acts over time beside the machine's record: standard deviations and rates."""
+    """Standard deviations and rates of disturbances over time."""
 
     push_sd: np.ndarray = field(default_factory=lambda: np.zeros(NB))  # white force, N or Nm, held for a tick
     colour: float = 0.0  # pole of the force noise; 0 is white
@@ -24,9 +24,9 @@ class Hidden:
     count_sd: np.ndarray = field(default_factory=lambda: np.zeros(NS))  # quanta
     walk: np.ndarray = field(default_factory=lambda: np.zeros(NS))  # quanta per root s
     lost_rate: np.ndarray = field(default_factory=lambda: np.zeros(NS))  # 1/s
-    lost: np.ndarray = field(default_factory=lambda: np.zeros(NS))  # quanta at a time
+    lost: np.ndarray = field(default_factory=lambda: np.zeros(NS))  # quanta per event
     lost_both: bool = True  # counts are lost and gained
-    spot_F: np.ndarray = field(default_factory=lambda: np.zeros(NB))  # dry friction that comes and goes, N or Nm
+    spot_F: np.ndarray = field(default_factory=lambda: np.zeros(NB))  # intermittent dry friction, N or Nm
     spot_rate: float = 0.0  # 1/s
     spot_s: float = 0.25
     gust: np.ndarray = field(default_factory=lambda: np.zeros(NB))  # one push, N or Nm
@@ -51,7 +51,7 @@ class Setup:
     w: np.ndarray
     settle: int
     how: str
-    band_hz: float  # top of the excitation
+    band_hz: float  # Hz, highest frequency of the excitation
     hidden: Hidden = field(default_factory=Hidden)
     seen: dict[str, np.ndarray] = field(default_factory=dict)  # trajectories of the machine without effects
 
@@ -81,7 +81,7 @@ class Setup:
 
 
 def draws(s: Setup, seed: list[int]) -> dict[str, np.ndarray]:
-    """push, spot (n, NB), extra, lost (n, NS) from one noise seed; each kind of noise has a stream of its own."""
+    """Noise arrays push, spot (n, NB), extra, lost (n, NS) from one seed; each kind has its own random stream."""
     h, n, Ts = s.hidden, s.n, s.Ts
     stream = [np.random.default_rng([*seed, i]) for i in range(6)]
     white = stream[0].standard_normal((n, NB))
@@ -110,5 +110,5 @@ def low_pass(x: np.ndarray, pole: float) -> np.ndarray:
 
 
 def nothing_played() -> np.ndarray:
-    """No recorded commands: the law is in charge."""
+    """Empty array of recorded commands: the law writes the commands."""
     return np.zeros((0, ND))

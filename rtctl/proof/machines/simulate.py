@@ -1,4 +1,4 @@
-"""Recordings of a setup, their noise floors, the change that an effect makes, and whether the loop holds."""
+"""Simulated recordings of a setup, noise floors, visibility of effects, and check of the loop."""
 
 import math
 
@@ -10,11 +10,11 @@ from rtctl.proof.machines.setup import Setup, draws, nothing_played
 
 Run = dict[str, np.ndarray]
 SATURATED = 0.3  # share of ticks at the limit above which a case is redrawn
-HIDDEN = ("exact", "states", "joints", "forces")  # of a run, not of its recording
+HIDDEN = ("exact", "states", "joints", "forces")  # arrays of a run that its recording does not hold
 
 
 def simulate(s: Setup, seed: list[int], played: np.ndarray | None = None) -> Run | None:
-    """Columns of a recording, and what no sensor shows under the names of HIDDEN; None where the loop ran away."""
+    """Columns of a recording, and the unmeasured arrays of HIDDEN; None where the loop was unstable."""
     a, n = draws(s, seed), s.n
     y, exact, u = np.zeros((n, NS)), np.zeros((n, NS)), np.zeros((n, ND))
     states, joints, forces = np.zeros((n, 2 * NB)), np.zeros((n, NJ)), np.zeros((n, ND))
@@ -40,7 +40,7 @@ def channels(s: Setup) -> list[str]:
 
 
 def floors(s: Setup, a: Run, b: Run) -> dict[str, float]:
-    """rms a channel that noise alone makes between two runs, at least that of the quantum."""
+    """Noise floor per channel: rms difference of runs with two noise seeds, at least the rms of the quantum."""
     quantum = dict(s.columns) | dict.fromkeys(s.commands, max(float(s.law["step"]), 1e-4 * float(s.law["limit"])))
     return {c: max(_rms(a[c] - b[c]) / math.sqrt(2.0), quantum[c] / math.sqrt(12.0)) for c in channels(s)}
 
@@ -56,7 +56,7 @@ def largest(seen: dict[str, dict[str, float]]) -> float:
 
 
 def healthy(s: Setup, run: Run | None) -> bool:
-    """The loop holds: finite, follows its reference, not at its limits; in an open loop the machine moves."""
+    """Whether the loop works: finite, follows its reference, not saturated; in open loop, the machine moves."""
     if run is None:
         return False
     for c in s.commands:

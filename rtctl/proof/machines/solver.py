@@ -1,4 +1,4 @@
-"""Closed loop of the true machine: Runge-Kutta of the fourth order at `sub` steps a tick, drives' filters exact.
+"""Simulation of the closed loop: Runge-Kutta of fourth order with `sub` steps a tick, exact filters of the drives.
 
 Row k holds the readings at tick k and the commands written then; a command acts `delay` sample times later. Before the
 first row the machine settles under the law with reference 0 and no excitation.
@@ -15,8 +15,8 @@ from rtctl.proof.machines.memory import joint_begin, modes, remember
 from rtctl.proof.machines.reading import raw
 from rtctl.proof.solver import second_order
 
-FINER = 10  # parts of a step in which friction or a contact changes its state
-RUNAWAY = 1e7  # of any state: the loop is unstable
+FINER = 10  # substeps of a step with a change of a friction or contact mode
+RUNAWAY = 1e7  # any state above this value: the loop is unstable
 
 
 @compiled
@@ -128,7 +128,7 @@ def run(m, law, start, settle, ref, w, played, push, spot, extra, lost, y, exact
                 x0[i] = x[i]
             advance(m, x, now, h, q0, e0, z, zj, xs, loose, F0, Fm, F1, noise, rub, k1, k2, k3, k4, x1, T, zt, acc)
             if modes(m, x, now + h, q0, e0, z, xs, loose, T, rub, mode):
-                for i in range(NX):  # something let go or took hold in this step: again in finer ones
+                for i in range(NX):  # a mode changed in this step: repeat it in finer steps
                     x[i] = x0[i]
                 for f in range(FINER):
                     for d in range(nd):
@@ -152,13 +152,13 @@ def run(m, law, start, settle, ref, w, played, push, spot, extra, lost, y, exact
 
 @compiled
 def between(a, b, c, r):
-    """Parabola through (0, a), (1/2, b), (1, c) at `r`."""
+    """Value at `r` of the parabola through (0, a), (1/2, b), (1, c)."""
     return a + r * (4.0 * b - 3.0 * a - c + 2.0 * r * (a - 2.0 * b + c))
 
 
 @compiled
 def advance(m, x, t, h, q0, e0, z, zj, xs, loose, F0, Fm, F1, noise, rub, k1, k2, k3, k4, x1, T, zt, acc):
-    """Move x (NX,) on by `h` s; F0, Fm, F1 (ND,) are the drives' forces at its begin, middle and end."""
+    """Advance x (NX,) by `h` s; F0, Fm, F1 (ND,) are the drive forces at start, middle and end of the step."""
     rate(m, x, t, q0, e0, z, zj, xs, loose, F0, noise, rub, k1, T, zt, acc)
     for i in range(NX):
         x1[i] = x[i] + 0.5 * h * k1[i]

@@ -1,4 +1,4 @@
-"""Machines that move a mass along a way: belt axis, ball screw, hoist, gantry, axis with a scale alone."""
+"""Topologies of linear machines: belt axis, ball screw, hoist, gantry, axis with only a scale."""
 
 import math
 

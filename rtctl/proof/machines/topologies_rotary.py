@@ -1,4 +1,4 @@
-"""Machines that turn: geared arm, torsional line, pendulum, spindle, two motors on one table."""
+"""Topologies of rotary machines: geared arm, torsional line, pendulum, spindle, two motors on one table."""
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from rtctl.proof.machines.draft import (
 
 
 def _hanging(rng: np.random.Generator, mass: float, arm: float, open_loop: bool) -> Json:
-    """Gravity of a pendulum that stands at its lowest point at the start, or at another angle under control."""
+    """Gravity of a pendulum that starts at its lowest point, or at another angle under control."""
     angle = 0.0 if open_loop or rng.random() < 0.8 else round(float(rng.uniform(-0.8, 0.8)), 3)
     return {"mass": mass, "arm": arm, "angle": angle}
 

@@ -1,4 +1,4 @@
-"""A recording in the formats of other programs, one file here for each."""
+"""Export of a recording to the formats of other programs; one module for each format."""
 
 import importlib
 from pathlib import Path
@@ -14,7 +14,7 @@ __all__ = ["ALL", "FORMATS", "Exported", "Format", "Selection", "export", "forma
 
 
 class Format(NamedTuple):
-    """One format: its module here, how its files end, who reads them, and the package and extra that it needs."""
+    """Export format: module, file suffix, programs that read it, and the package and extra it needs."""
 
     module: str
     suffix: str
@@ -57,10 +57,10 @@ def format_of(name: str) -> Format:
 
 
 def export(folder: Path | str, to: str, out: Path | str | None = None, selection: Selection = ALL) -> Exported:
-    """Write the bundle in `folder` as `to`, a name of FORMATS, into `out`, `trace.*` in it if None.
+    """Export the bundle in `folder` as format `to` (a name of FORMATS) to `out`, by default `trace.*` in the bundle.
 
-    The file is there whole or not at all. Raises UserError where the bundle, the selection or the place is wrong, or
-    where the format's package is not installed.
+    The file is written atomically. Raises UserError for an invalid bundle, selection or path, and where the package of
+    the format is not installed.
     """
     form = format_of(to)
     writer = _writer(to, form)
@@ -73,7 +73,7 @@ def export(folder: Path | str, to: str, out: Path | str | None = None, selection
     if not path.parent.is_dir():
         raise UserError(f"{path}: cannot be written (there is no folder {path.parent})")
     try:
-        with replaced_path(path, form.suffix) as part:  # some packages look at how the name ends
+        with replaced_path(path, form.suffix) as part:  # some packages check the suffix
             writer.write(source, part)
     except (pa.ArrowException, OSError) as error:
         why = getattr(error, "strerror", None) or str(error).splitlines()[0]
@@ -82,7 +82,7 @@ def export(folder: Path | str, to: str, out: Path | str | None = None, selection
 
 
 def _writer(to: str, form: Format) -> Any:
-    """The module that writes the format."""
+    """Module that writes the format."""
     try:
         return importlib.import_module(f"rtctl.trace.export.{form.module}")
     except ModuleNotFoundError as error:

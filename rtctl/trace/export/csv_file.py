@@ -1,6 +1,6 @@
-"""CSV as RFC 4180 has it: a line of names with their units, then a line for each row; commas, decimal points, CRLF.
+"""CSV by RFC 4180: a line of names with units, then a line for each row; commas, decimal points, CRLF.
 
-A number is written with as many digits as give the same bits back. What was not measured is an empty cell.
+A number has the digits that reproduce its bits. A value that was not measured is an empty cell.
 Memory: one batch of rows.
 """
 
@@ -19,7 +19,7 @@ PLAIN = pa_csv.WriteOptions(include_header=False)
 
 
 def header(column: Column) -> str:
-    """`ref [rad]`; a number without a unit has its name alone."""
+    """Title of a column: `ref [rad]`; only the name for a column without unit."""
     return f"{column.name} [{column.unit}]" if column.unit not in ("", "1") else column.name
 
 

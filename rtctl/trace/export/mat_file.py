@@ -1,8 +1,8 @@
-"""MATLAB's file, version 5: a column vector for each signal, and the struct `units` with a field for each of them.
+"""MATLAB file, version 5: a column vector for each signal, and the struct `units` with a field for each signal.
 
     s = load('trace.mat'); plot(s.t, s.ref), ylabel(s.units.ref)
 
-Memory: one column, 8 bytes a row, and as much again while it is written. The format holds 2 GiB in a variable.
+Memory: two columns, 8 bytes a row each. A variable of this format holds up to 2 GiB.
 """
 
 import re
@@ -22,7 +22,7 @@ OURS = ("units", "help", "case_json", "columns")  # variables beside the signals
 
 
 def names(source: Source) -> dict[str, str]:
-    """Variable for each column: a letter, then letters, digits and underlines, no two the same."""
+    """Unique variable name for each column: a letter, then letters, digits and underscores."""
     given: dict[str, str] = {}
     for column in source.columns:
         name = re.sub(r"\W", "_", column.name, flags=re.ASCII)[:LONGEST]
@@ -35,7 +35,7 @@ def names(source: Source) -> dict[str, str]:
 
 
 class Variables(Mapping[str, Any]):
-    """What goes into the file; a signal is read when it is asked for, so that only one is in memory."""
+    """Variables of the file. A signal is read on access: only one signal is in memory."""
 
     def __init__(self, source: Source):
         self._source, self._names = source, names(source)

@@ -1,7 +1,7 @@
-"""An MCAP file whose messages all have one length: a chunk and its index are written as one array each.
+"""MCAP file with messages of one length: a chunk and its index are written as one array each.
 
 Header, schema, channel, attachment and summary are records of the package mcap. Its Writer takes one message a call,
-which costs more than everything else together.
+which would cost more time than the rest of the export.
 
 Source: MCAP specification (mcap.dev/spec): chunks, message indexes, summary.
 """
@@ -67,7 +67,7 @@ class ChunkFile:
         self._put(_bytes(Header("", library), *self._told))
 
     def records(self, count: int) -> np.ndarray:
-        """Records for `count` messages, their heads filled in as far as they are known; fill `message` and times."""
+        """Records (count,) of messages with known header fields; the caller fills `message`, `rows` the times."""
         rows = np.zeros(count, self._record)
         rows["opcode"], rows["channel"] = Opcode.MESSAGE, CHANNEL
         rows["length"] = self._record.itemsize - 9
@@ -99,14 +99,14 @@ class ChunkFile:
         self._end, self._messages = max(self._end, end), self._messages + n
 
     def metadata(self, name: str, values: dict[str, str]) -> None:
-        """A record of names and texts."""
+        """Write a metadata record of names and texts."""
         data = _bytes(Metadata(name=name, metadata=values))
         index = MetadataIndex(offset=self._at, length=len(data), name=name)
         self._summary.setdefault(Opcode.METADATA_INDEX, []).append(index)
         self._put(data)
 
     def attachment(self, at: int, name: str, media_type: str, content: bytes) -> None:
-        """A file within the file, of the time `at`, ns."""
+        """Write an attachment with the time `at` in ns."""
         data = _bytes(Attachment(create_time=at, log_time=at, name=name, media_type=media_type, data=content))
         index = AttachmentIndex(offset=self._at, length=len(data), create_time=at, log_time=at,
                                 data_size=len(content), name=name, media_type=media_type)  # fmt: skip

@@ -1,8 +1,8 @@
-"""MCAP, which Foxglove, PlotJuggler and Rerun open: one topic, named as the machine, a protobuf message for each row.
+"""MCAP for Foxglove, PlotJuggler and Rerun: one topic, named as the machine, a protobuf message for each row.
 
-Log time and publish time are one: when the recording began, plus `t`, to the nanosecond. `t` itself and every other
-number are in the message to the bit; what was not measured is nan, and a column of integers with gaps is one of
-doubles. Units are in the schema's comments and in the metadata `rtctl.units`; case.json is attached.
+Log time and publish time are the start of the recording plus `t`, to the nanosecond. A message holds `t` and every
+other number to the bit. A value that was not measured is nan; an integer column with gaps becomes doubles. Units are
+in the schema's comments and in the metadata `rtctl.units`; case.json is attached.
 
 Memory: one batch of rows, and one chunk of messages.
 """
@@ -31,7 +31,7 @@ def write(source: Source, path: Path) -> None:
         made = ChunkFile(file, f"rtctl {__version__}", json_rows.topic(source.name), schema, protobuf_rows.dtype(found))
         made.metadata(UNITS, {c.name: c.unit for c in source.columns if c.unit})
         made.attachment(epoch, CASE, "application/json", as_json(source.case, indent=1).encode())
-        rows = made.records(ROWS)  # filled anew for each chunk; the tags stay
+        rows = made.records(ROWS)  # reused for each chunk with the same tags
         for n, field in enumerate(found):
             rows["message"][f"tag{n}"] = np.void(field.tag)
         for batch in source.batches():
@@ -46,7 +46,7 @@ def write(source: Source, path: Path) -> None:
 
 
 def _dtypes(source: Source) -> list[np.dtype]:
-    """What each column is in a message."""
+    """dtype of each column in a message."""
     gaps = source.gaps
     kinds = [np.dtype(source.schema.field(column.name).type.to_pandas_dtype()) for column in source.columns]
     return [

@@ -1,10 +1,10 @@
 """MCAP with JSON messages: one topic, named as the machine, a JSON message for each row.
 
-Log time and publish time are one: when the recording began, plus `t`, to the nanosecond. `t` itself and every other
-number are in the message with all their digits; what was not measured is left out of it. Units are in the schema, and
-case.json is attached. `mcap` (mcap_file.py) holds the same with protobuf messages, which are written much faster.
+Log time and publish time are the start of the recording plus `t`, to the nanosecond. A message holds `t` and every
+other number with all digits. A value that was not measured is left out. Units are in the schema, and case.json is
+attached. `mcap` (mcap_file.py) holds protobuf messages instead, which are written much faster.
 
-Memory: one batch of rows as Python's numbers.
+Memory: one batch of rows as Python numbers.
 """
 
 import json
@@ -19,7 +19,7 @@ from rtctl.trace.bundle import CASE, as_json
 from rtctl.trace.export.source import Source
 
 UNITS = "rtctl.units"  # metadata record: unit of each column
-SLICE = 4096  # rows that are Python's numbers at a time
+SLICE = 4096  # rows converted to Python numbers at a time
 
 
 def write(source: Source, path: Path) -> None:

@@ -1,6 +1,6 @@
 """ASAM MDF 4.10: one channel group whose master is the controller's clock, a channel for each signal, with its unit.
 
-Memory: one batch of rows; on the way the rows are on disk twice.
+Memory: one batch of rows. During the export the rows are on disk twice.
 """
 
 from datetime import UTC

@@ -1,4 +1,4 @@
-"""One Parquet file of the rows and columns that were chosen; name, unit and help of each column in its metadata.
+"""Parquet file of the selected rows and columns; the metadata of each column holds its unit and help.
 
 Memory: one row group.
 """

@@ -1,7 +1,7 @@
-"""Rerun's recording: an entity `/ivu/ref` with scalars for each signal, and panels by unit, as they plot by themselves.
+"""Rerun recording: an entity such as `/ivu/ref` with scalars for each signal, and a blueprint of panels by unit.
 
-Timelines: `t`, the controller's clock as a duration, and `time`, when the recording began plus `t`. The help and the
-unit of a signal are static beside it; `/case` is case.json. A value that was not measured is a gap.
+Timelines: `t`, the controller's clock as a duration, and `time`, the start of the recording plus `t`. Help and unit of
+a signal are static components; `/case` is case.json. A value that was not measured is a gap.
 
 Memory: one batch of rows.
 """
@@ -23,7 +23,7 @@ T, TIME, CASE = "t", "time", "case"
 
 def write(source: Source, path: Path) -> None:
     """Write the rows of `source` to `path`. Raises OSError, UserError where Rerun is switched off."""
-    path.touch()  # raises where rerun would print and go on
+    path.touch()  # raises OSError; rerun would only print it
     stream = rr.RecordingStream(f"rtctl_{source.name}", send_properties=True)
     stream.save(path, default_blueprint=_blueprint(source))
     stream.log(CASE, rr.TextDocument(as_json(source.case, indent=1), media_type="text/plain"), static=True)
@@ -48,7 +48,7 @@ def _entity(source: Source, column: Column) -> str:
 
 
 def _part(name: str) -> str:
-    """One part of an entity's path; what Rerun does not take bare is escaped by it."""
+    """One part of an entity path, with special characters escaped by Rerun."""
     return str(rr.escape_entity_path_part(name))
 
 
@@ -57,7 +57,7 @@ def _title(column: Column) -> str:
 
 
 def _blueprint(source: Source) -> Any:
-    """A panel for each unit, the clock along its axis."""
+    """Blueprint with a time series panel for each unit."""
     panels: dict[str, list[str]] = {}
     for column in source.columns[1:]:  # the first is the clock
         panels.setdefault("" if column.unit == "1" else column.unit, []).append(_entity(source, column))

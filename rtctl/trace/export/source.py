@@ -1,4 +1,4 @@
-"""What an export reads: chosen columns and rows of a bundle, a batch at a time, however long it is."""
+"""Source of an export: selected columns and rows of a bundle, read in batches."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -16,12 +16,12 @@ from rtctl.trace.columns import Column, columns_of
 
 
 class Selection(NamedTuple):
-    """Which columns (all if none; `t` always comes along) and which rows."""
+    """Selected columns (all if empty; `t` is always included) and rows."""
 
     columns: tuple[str, ...] = ()
     start: float = -math.inf  # s of the column t
     end: float = math.inf
-    every: int = 1  # keep the first row of so many; there is no filter in front
+    every: int = 1  # keep the first row of each `every` rows, without a filter
 
 
 ALL = Selection()
@@ -30,8 +30,8 @@ ALL = Selection()
 class Source:
     """The selected rows of a bundle, all parts as one.
 
-    `columns` start with `t`, `rows` is their number, `case` and `paths` are those of the bundle. Raises UserError where
-    it is no finished bundle, has no column of a name, or no row is left.
+    `columns` start with `t`, `rows` is the number of rows, `case` and `paths` belong to the bundle. Raises UserError
+    for an unfinished or invalid bundle, a missing column, or an empty selection.
     """
 
     def __init__(self, folder: Path | str, selection: Selection = ALL):
@@ -47,12 +47,12 @@ class Source:
 
     @property
     def name(self) -> str:
-        """What the machine is called in a file: ivu, ldu, axis."""
+        """Name of the machine in a file: ivu, ldu, axis."""
         return str(self.case.get("plant") or (self.case.get("config") or {}).get("name") or "trace")
 
     @property
     def started(self) -> datetime | None:
-        """When the recording began, with its time zone; None where the case does not say."""
+        """Start of the recording with its time zone; None where the case has none."""
         try:
             found = datetime.fromisoformat(str(self.case.get("recorded_at")))
         except ValueError:
@@ -61,14 +61,14 @@ class Source:
 
     @property
     def epoch(self) -> int:
-        """Time of `t` = 0, ns since 1970; as late as keeps every row at or after 1970."""
+        """Time of `t` = 0 in ns since 1970, shifted where a row would be before 1970."""
         began = self.started
         epoch = int(began.timestamp() // 1) * 1_000_000_000 + began.microsecond * 1000 if began else 0
         return max(epoch, math.ceil(-self.span[0]) * 1_000_000_000)
 
     @property
     def gaps(self) -> set[str]:
-        """Columns with a value that is missing: null, not nan."""
+        """Columns with missing values: null, not nan."""
         found: set[str] = set()
         for path in self.paths:
             with _reading(path) as file:
@@ -76,13 +76,13 @@ class Source:
                     columns = file.metadata.row_group(group)
                     for n in range(columns.num_columns):
                         one = columns.column(n)
-                        if one.statistics is None or one.statistics.null_count != 0:  # None: nobody has counted them
+                        if one.statistics is None or one.statistics.null_count != 0:  # None: nulls were not counted
                             found.add(one.path_in_schema)
         return found
 
     @property
     def rate(self) -> float | None:
-        """Rows a second of the selection, as the case says; None where the clock is uneven."""
+        """Rate of the selection in Hz, from the case; None where the clock is uneven."""
         rate = self.case.get("sample_rate")
         return rate / self._selection.every if isinstance(rate, int | float) and rate > 0 else None
 
@@ -110,7 +110,7 @@ class Source:
                         yield pa.record_batch(arrays, schema=schema)
 
     def arrays(self) -> Iterator[dict[str, np.ndarray]]:
-        """The same as arrays by name; what was not measured is nan."""
+        """The selected rows in batches of arrays by name; nan where a value was not measured."""
         for batch in self.batches():
             yield {name: batch.column(name).to_numpy(zero_copy_only=False) for name in batch.schema.names}
 
@@ -126,7 +126,7 @@ class Source:
         return whole
 
     def _schema(self, wanted: Sequence[str]) -> pa.Schema:
-        """Fields of the selection: `t`, then as asked for or as in the file. A column of nulls alone is of doubles."""
+        """Fields of the selection: `t`, then as in `wanted` or the file. A column of only nulls becomes doubles."""
         found = [_schema_of(path) for path in self.paths]
         for path, schema in zip(self.paths, found, strict=True):
             if not schema.equals(found[0]):
@@ -155,14 +155,14 @@ class Source:
         return first, last, rows
 
     def _clock(self) -> str:
-        """From when to when the recording itself runs, for a message."""
+        """Time span of the whole recording, for a message."""
         ends = [t for path in self.paths if len(t := pq.read_table(path, columns=["t"]).column(0))]
         return f"; its column t runs from {ends[0][0].as_py():g} s to {ends[-1][-1].as_py():g} s" if ends else ""
 
 
 def _reading(path: Path) -> pq.ParquetFile:
     try:
-        return pq.ParquetFile(path, pre_buffer=False)  # else it keeps what it has read ahead, the whole file
+        return pq.ParquetFile(path, pre_buffer=False)  # pre_buffer would keep the whole file in memory
     except (pa.ArrowException, OSError) as error:
         raise UserError(f"{path} cannot be read as Parquet: {str(error).splitlines()[0]}") from None
 
@@ -170,7 +170,7 @@ def _reading(path: Path) -> pq.ParquetFile:
 def _schema_of(path: Path) -> pa.Schema:
     with _reading(path) as file:
         try:
-            file.schema_arrow.names  # noqa: B018  names that are no text are told only when asked for
+            file.schema_arrow.names  # noqa: B018  Arrow decodes names, and fails, only on access
         except UnicodeDecodeError as error:
             raise UserError(f"{path}: the name of a column is not text in UTF-8: {error.object[:20]!r}") from None
         return file.schema_arrow

@@ -1,6 +1,6 @@
-"""NI's TDMS: one group, named as the machine, a channel for each signal, with its unit as LabVIEW and DIAdem know it.
+"""NI TDMS: one group, named as the machine, a channel for each signal, with its unit for LabVIEW and DIAdem.
 
-Where the rate is even the channels are waveforms too (`wf_increment`); `t` is a channel in any case.
+With an even rate the channels are also waveforms (`wf_increment`). `t` is always a channel.
 
 Memory: one batch of rows.
 """

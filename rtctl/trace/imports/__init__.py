@@ -1,4 +1,4 @@
-"""Recordings of other programs as bundles: readers, one file here for each kind, and what makes a bundle of them."""
+"""Import of recordings of other programs: one reader for each file format, and conversion to a bundle."""
 
 import importlib
 import zipfile
@@ -11,7 +11,7 @@ from rtctl.trace.imports.text_form import TextPlan
 
 __all__ = ["READERS", "Table", "read"]
 
-READERS = {  # how the name ends -> module here
+READERS = {  # file suffix -> module
     ".csv": "csv_file",
     ".tsv": "csv_file",
     ".txt": "csv_file",
@@ -31,7 +31,7 @@ READERS = {  # how the name ends -> module here
     ".h5": "hdf5_file",
     ".hdf5": "hdf5_file",
 }
-PACKAGES = {  # package that a reader needs -> what installs it
+PACKAGES = {  # package that a reader needs -> pip requirement
     "mcap": "mcap",
     "asammdf": "'rtctl[mf4]'",
     "nptdms": "'rtctl[tdms]'",
@@ -39,7 +39,7 @@ PACKAGES = {  # package that a reader needs -> what installs it
     "zstandard": "zstandard",
     "lz4": "lz4",
 }
-MAGIC = {  # first bytes -> module here
+MAGIC = {  # first bytes -> module
     b"PAR1": "parquet_file",
     b"ARROW1": "parquet_file",
     b"\x89MCAP0\r\n": "mcap_file",
@@ -51,19 +51,19 @@ MAGIC = {  # first bytes -> module here
     b"\x93NUMPY": "npz_file",
 }
 TEXT = ("csv_file", "json_file")
-HEAD = 4096  # bytes from which the kind is seen
+HEAD = 4096  # bytes read to detect the format
 
 
 def read(path: Path | str, text: TextPlan | None = None) -> Table:
-    """All columns of a file, into memory; `text` is what its owner says of a file of text.
+    """Table of all columns of a file, in memory; `text` is the user's description of a text file.
 
-    Raises UserError where it cannot be read, or its kind is not known.
+    Raises UserError for an unreadable file or an unknown format.
     """
     path = Path(path)
     if path.is_dir():
         raise UserError(f"{path} is a folder; give the file in it, one of {', '.join(READERS)}")
     if not path.is_file():
-        raise UserError(f"{path}: no such file" if not path.exists() else f"{path} is no plain file")
+        raise UserError(f"{path}: no such file" if not path.exists() else f"{path} is no regular file")
     try:
         return _read(path, text or TextPlan(), 0)
     except ModuleNotFoundError as error:
@@ -91,7 +91,7 @@ def _read(path: Path, text: TextPlan, depth: int) -> Table:
     if by_content is None and by_name is None:
         near = nearest(suffix, READERS)
         hint = f"is it a {near}?" if near else "if it is one of these, name it so"
-        raise UserError(f"{path}: cannot import '{suffix}'; what can be is {', '.join(READERS)}; {hint}")
+        raise UserError(f"{path}: cannot import '{suffix}'; importable are {', '.join(READERS)}; {hint}")
     kind = by_content or by_name
     if by_name == "mat_file" and kind == "hdf5_file":
         kind = by_name
@@ -100,7 +100,9 @@ def _read(path: Path, text: TextPlan, depth: int) -> Table:
         table = module.read(path, text)
     elif text.model_fields_set:
         option = sorted(text.model_fields_set)[0].replace("_", "-")
-        raise UserError(f"{path} is read as {str(kind).removesuffix('_file')}, and --{option} is of files of text")
+        raise UserError(
+            f"{path} is read as {str(kind).removesuffix('_file')}, and --{option} applies only to text files"
+        )
     else:
         table = module.read(path)
     if by_name is not None and kind != by_name and not (by_name in TEXT and kind in TEXT):
@@ -110,7 +112,7 @@ def _read(path: Path, text: TextPlan, depth: int) -> Table:
 
 
 def _content(path: Path, head: bytes) -> str | None:
-    """Module that reads a file with these first bytes; None where they say nothing."""
+    """Module that reads a file with these first bytes; None where they identify no format."""
     for magic, module in MAGIC.items():
         if head.startswith(magic):
             return module
@@ -125,7 +127,7 @@ def _content(path: Path, head: bytes) -> str | None:
 
 
 def _zip(path: Path) -> str:
-    """Module for a zip of arrays. Raises UserError for another one."""
+    """Module for a zip archive of arrays. Raises UserError for any other zip archive."""
     try:
         with zipfile.ZipFile(path) as archive:
             names = archive.namelist()

@@ -1,4 +1,4 @@
-"""case.json of an imported recording: what the plan says of the machine, and no more."""
+"""case.json of an imported recording, from the plan alone."""
 
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ from rtctl.trace.imports.table import Table
 
 
 def case_of(table: Table, plan: Plan, units: dict[str, str], rate: float | None, rows: int) -> dict[str, Any]:
-    """The case of an imported recording; `units` are those of our columns. Raises UserError."""
+    """Case of an imported recording; `units` are the units of its rtctl columns. Raises UserError."""
     given = dict(plan.case)
     for key in ("sensors", "drive", "controller"):
         if not isinstance(given.get(key, {}), dict):
@@ -51,8 +51,8 @@ def case_of(table: Table, plan: Plan, units: dict[str, str], rate: float | None,
 
 
 def checked(case: dict[str, Any], folder: Path) -> list[str]:
-    """What the case is warned of. Raises UserError where it cannot be."""
-    there = f"{folder / CASE}: "  # it is not yet
+    """Warnings about the case. Raises UserError for an invalid case."""
+    there = f"{folder / CASE}: "  # case.json is not written yet
     try:
         as_json(case)
         return [warning.removeprefix(there) for warning in read_case(case, folder).warnings]
@@ -63,9 +63,9 @@ def checked(case: dict[str, Any], folder: Path) -> list[str]:
 
 
 def _parameter(plant: str, name: str, value: float | str, axis: Quantities) -> float:
-    """A parameter in SI. A name that the model does not have is told of by the case's own check."""
+    """Parameter in SI. The check of the case reports names that the model does not have."""
     exchange = profile_of(plant).exchange
-    assert exchange is not None  # the plan has checked it
+    assert exchange is not None  # checked by the plan
     field = exchange.parameters.model_fields.get(name)
     extra = field.json_schema_extra if field else None
     unit = extra.get("unit") if isinstance(extra, dict) else ""

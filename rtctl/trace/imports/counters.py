@@ -1,7 +1,7 @@
-"""Counters that wrap: a step beyond half of the modulus where all other steps are smaller.
+"""Unwrapping of counters: a wrap is a step beyond half of the modulus where all other steps are smaller.
 
-The modulus is a power of two or the counts of a turn that the owner tells. It lies between the range that the counter
-shows and that range plus one step. Where no such number does, the jump is told and the counter stays as it is.
+The modulus is a power of two, or counts per turn given by the user. It lies between the range of the counter and the
+range plus one step. Without a modulus in this interval, a note reports the jump and the counter stays unchanged.
 """
 
 from collections.abc import Iterable, Mapping
@@ -10,18 +10,18 @@ from typing import Any, NamedTuple
 import numpy as np
 
 BITS = range(8, 65)
-LEAST_RANGE = 16  # counts: below it a jump and a step are alike
-REST = 1.25  # of the largest other step: what a wrapped step may be without its wrap
-AGREES = 0.1  # of the largest other step: how far a wrapped step may be from its neighbours
+LEAST_RANGE = 16  # counts: in a smaller range a jump cannot be told from a step
+REST = 1.25  # share of the largest other step: limit of a wrapped step after unwrapping
+AGREES = 0.1  # share of the largest other step: tolerance of an unwrapped step to its neighbours
 
 
 class Unwrapped(NamedTuple):
     counts: np.ndarray  # (n,)
-    note: str  # sentence for people; empty where nothing wraps
+    note: str  # sentence for the user; empty without a wrap or jump
 
 
 def unwrapped(name: str, counts: np.ndarray, per_turn: Iterable[float] = ()) -> Unwrapped:
-    """Counts (n,) without their wraps; `per_turn` are moduli that the owner tells."""
+    """Counts (n,) without wraps, and a note; `per_turn` are moduli given by the user."""
     d = np.diff(counts)
     if not len(d):
         return Unwrapped(counts, "")
@@ -53,7 +53,7 @@ def unwrapped(name: str, counts: np.ndarray, per_turn: Iterable[float] = ()) -> 
 
 
 def per_turn(case: Mapping[str, Any]) -> list[float]:
-    """Counts of a turn that the case tells of its sensors."""
+    """Counts per turn of the sensors in the case."""
     sensors = case.get("sensors")
     found = sensors.items() if isinstance(sensors, Mapping) else ()
     return [

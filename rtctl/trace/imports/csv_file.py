@@ -1,7 +1,7 @@
-"""Text with a line for each row: comma, semicolon, tab, pipe or white space between the cells.
+"""Reader of text with a line for each row: comma, semicolon, tab, pipe or white space between the cells.
 
-Where names, units and rows stand, and what parts the cells, is seen from the file (text_form.py); the decimal sign is
-that of the whole file (numerals.py). What the owner says goes first.
+Separator and position of names, units and rows are detected (text_form.py). The decimal sign is one for the whole file
+(numerals.py). The user's settings take precedence.
 """
 
 import codecs
@@ -24,8 +24,8 @@ from rtctl.trace.imports.names import named
 from rtctl.trace.imports.table import Table
 from rtctl.trace.imports.text_form import Form, TextPlan, cells, form_of, is_comment
 
-HEAD = 1 << 16  # characters from which the form of the file is seen
-TAKES = 4  # bytes of memory for each byte of text, about: the text twice, its cells, and their numbers
+HEAD = 1 << 16  # characters read to detect the form of the file
+TAKES = 4  # bytes of memory for each byte of text, estimated: text twice, cells, numbers
 MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
 NAN = ["", "nan", "NaN", "NAN", "-nan", "null", "NULL", "N/A", "n/a"]
 
@@ -44,7 +44,7 @@ def read(path: Path, plan: TextPlan | None = None) -> Table:
 
 
 def _text(path: Path, given: str | None) -> tuple[str, str]:
-    """The file's text, its lines ended by a line feed alone, and what was assumed of it. Raises UserError."""
+    """Text of the file with line feeds as line ends, and a note on its encoding. Raises UserError."""
     refuse_large(path, TAKES * path.stat().st_size, "its text and numbers")
     raw = path.read_bytes()
     if not raw.strip():
@@ -76,7 +76,7 @@ def _columns(path: Path, text: str, form: Form, decimal: str | None) -> list[np.
     full = pc.is_valid(columns[0])
     for column in columns[1:]:
         full = pc.or_(full, pc.is_valid(column))
-    if not pc.all(full).as_py():  # rows of separators alone, as spreadsheets write them below the last one
+    if not pc.all(full).as_py():  # spreadsheets write rows of only separators at the end
         columns = [column.filter(full) for column in columns]
     if decimal is None:
         decimal = "."
@@ -87,7 +87,7 @@ def _columns(path: Path, text: str, form: Form, decimal: str | None) -> list[np.
 
 
 def _body(text: str, form: Form) -> bytes:
-    """The rows, as UTF-8 with one separator between the cells."""
+    """Rows as UTF-8 with one separator between the cells."""
     at = 0
     for _ in range(form.first):
         at = text.find("\n", at) + 1
@@ -99,7 +99,7 @@ def _body(text: str, form: Form) -> bytes:
 
 
 def _may_group(body: bytes, form: Form) -> bool:
-    """Whether a file without commas has dots, and its first rows none that can only be a decimal point."""
+    """Whether the dots of a file without commas may group thousands: no certain decimal point in its first rows."""
     point = re.compile(numerals.DECIDES["."])
     lines = itertools.islice((line for line in body.split(b"\n", 2000) if b"." in line), 1000)
     found = (cell for line in lines for cell in cells(line.decode("utf-8", "replace"), form.separator))
@@ -107,7 +107,7 @@ def _may_group(body: bytes, form: Form) -> bool:
 
 
 def _cells(path: Path, body: bytes, text: str, form: Form, as_text: bool) -> list[pa.ChunkedArray]:
-    """The columns as Arrow reads them, or as the texts that they are. Raises UserError."""
+    """Columns as Arrow reads them, or as texts. Raises UserError."""
     names = [str(k) for k in range(form.width)]
     if not body.strip():
         return [pa.chunked_array([pa.array([], pa.float64())]) for _ in names]
@@ -141,7 +141,7 @@ def _cells(path: Path, body: bytes, text: str, form: Form, as_text: bool) -> lis
 
 
 def _values(column: pa.ChunkedArray, decimal: str) -> np.ndarray:
-    """Numbers (n,), else dates or durations, else the texts as they are."""
+    """Numbers (n,), else dates or durations, else unchanged texts."""
     kind = column.type
     if pa.types.is_null(kind):
         return np.full(len(column), np.nan)
@@ -156,7 +156,7 @@ def _values(column: pa.ChunkedArray, decimal: str) -> np.ndarray:
 
 
 def _dates(column: pa.ChunkedArray) -> np.ndarray | None:
-    """Dates (ISO 8601, or 26.11.2026) and times of day (n,) of a column of texts; None where they are none."""
+    """Dates (ISO 8601, or 26.11.2026) or times of day (n,) of a column of texts; None for other texts."""
     texts = pc.utf8_trim_whitespace(column)
     texts = pc.replace_substring_regex(texts, r"^([^,]*:\d\d),(\d+)", r"\1.\2")
     texts = pc.replace_substring_regex(texts, r"^(\d\d)\.(\d\d)\.(\d{4})", r"\3-\2-\1")
@@ -170,7 +170,7 @@ def _dates(column: pa.ChunkedArray) -> np.ndarray | None:
 
 
 def _heads(path: Path, form: Form) -> tuple[list[str | None], dict[str, str], list[str]]:
-    """Names (None: a column without one that is left out), units by name, and sentences. Raises UserError."""
+    """Names (None: unnamed column, left out), units by name, and notes. Raises UserError."""
     lines = "1 line" if form.passed == 1 else f"{form.passed} lines"
     notes = [f"{lines} before the names {'was' if form.passed == 1 else 'were'} passed over"] if form.passed else []
     if form.names is None:
@@ -203,7 +203,7 @@ def _line(text: str, form: Form, row: int) -> int:
 
 
 def _line_of(text: str, wanted: str, form: Form) -> int:
-    """The line that Arrow refused, which white space may part."""
+    """Number of the line that Arrow refused."""
     whole = wanted.split()
     return next((n for n, line in _rows(text, form) if line.split() == whole), 0)
 

@@ -1,4 +1,4 @@
-"""Bundle of exchange format 2 from a table: columns of the description's drives and sensors, and what is believed."""
+"""Bundle of exchange format 2 from a table: columns of the drives and sensors, and the nominal model."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -20,10 +20,10 @@ from rtctl.trace.imports.table import Table
 from rtctl.trace.part import refuse_taken
 
 FORMAT = 2
-TOLERANCE = 0.15  # of a description whose file names none
-OFF_COUNT = 0.1  # of a count: how far a number in another unit may be from whole counts
-PREFIXES, OTHERS = ("m", "u", "k"), ("deg", "turn", "rpm")  # of a unit that a column may be in
-BESIDE = {"ref": "", "w": ""}  # columns that a described machine may have beside its own
+TOLERANCE = 0.15  # default relative tolerance of the nominal values
+OFF_COUNT = 0.1  # counts: tolerance of a converted number to whole counts
+PREFIXES, OTHERS = ("m", "u", "k"), ("deg", "turn", "rpm")  # of accepted units of a column
+BESIDE = {"ref": "", "w": ""}  # optional columns of every described machine
 NOT_OURS = {"plant": "--plant", "parameters": "--parameter"}
 
 
@@ -32,8 +32,8 @@ class Wanted(NamedTuple):
 
     column: str
     what: str  # "drive amplifier"
-    unit: str  # SI unit of what it shows, or the command's unit
-    scale: float  # column units for one such unit
+    unit: str  # SI unit of the quantity, or the unit of the command
+    scale: float  # column units per `unit`
     counts: bool
     help: str
 
@@ -41,7 +41,7 @@ class Wanted(NamedTuple):
 def make_described(table: Table, plan: Plan, believed: Believed, folder: Path | str) -> Imported:
     """Write the bundle of `table` into `folder`, which must not hold one.
 
-    Raises UserError that names file, column and row and says what would be right; nothing is written then.
+    Writes nothing and raises UserError with file, column, row and remedy for an invalid table.
     """
     folder = Path(folder)
     for key, option in NOT_OURS.items():
@@ -80,7 +80,7 @@ def make_described(table: Table, plan: Plan, believed: Believed, folder: Path | 
 
 
 def wanted_columns(believed: Believed) -> dict[str, Wanted]:
-    """Columns of the description by name: those of drives, of sensors and of measured inputs."""
+    """Columns of the description by name, of drives, sensors and measured inputs."""
     machine = believed.machine
     out: dict[str, Wanted] = {}
     for name, drive in machine.drives.items():
@@ -111,7 +111,7 @@ def _column_of(name: str, known: Mapping[str, Wanted]) -> str:
 
 
 def _chosen(table: Table, plan: Plan, known: dict[str, Wanted], believed: Believed) -> dict[str, ColumnPlan]:
-    """Our columns and theirs: as --map says, else those of the same name. An empty reference or excitation is none."""
+    """File column for each rtctl column: by --map, else by equal name. An empty reference or excitation is left out."""
     named: dict[str, ColumnPlan] = {}
     for name, given in plan.columns.items():
         ours = _column_of(name, known)
@@ -120,7 +120,7 @@ def _chosen(table: Table, plan: Plan, known: dict[str, Wanted], believed: Believ
             there = ", ".join(f"{w.column} ({w.what})" for w in known.values())
             hint = f"did you mean '{near}'?" if near else f"it has {there}"
             raise UserError(f"--map {name}={given.column}: the machine has no column '{name}'; {hint}")
-        before = named.get(ours, ColumnPlan())  # --map by the column and --unit by the sensor are one
+        before = named.get(ours, ColumnPlan())  # merges --map by the column with --unit by the sensor
         named[ours] = ColumnPlan(
             column=given.column or before.column, unit=given.unit if given.unit is not None else before.unit
         )
@@ -147,7 +147,7 @@ def _need(table: Table, named: Mapping[str, ColumnPlan], wanted: Mapping[str, Wa
         taken = {given.column for given in named.values()}
         there = [name for name in table.columns if name not in taken][:20]
         raise UserError(
-            f"{table.path}: no column is '{what.column}' of {what.what}; --map {what.column}=NAME says which, of "
+            f"{table.path}: no column is '{what.column}' of {what.what}; name it with --map {what.column}=NAME, one of "
             f"{', '.join(there) or 'none that is left'}"
         )
 
@@ -155,7 +155,7 @@ def _need(table: Table, named: Mapping[str, ColumnPlan], wanted: Mapping[str, Wa
 def _signals(
     table: Table, plan: Plan, chosen: Mapping[str, ColumnPlan], known: Mapping[str, Wanted]
 ) -> tuple[dict[str, np.ndarray], list[str]]:
-    """Columns in the units of the description by our names, and what was assumed."""
+    """Columns by rtctl name in the units of the description, and notes on assumptions."""
     columns: dict[str, np.ndarray] = {}
     notes: list[str] = list(table.notes)
     assumed = []
@@ -187,7 +187,7 @@ def _signals(
 
 
 def _shown(want: Wanted | None) -> str:
-    """Unit of a column as the description has it; a minus that turns its direction round is no unit."""
+    """Unit of a column in the description; a minus only reverses the direction."""
     if want is None:
         return ""
     if want.counts:
@@ -203,7 +203,7 @@ def _shown(want: Wanted | None) -> str:
 
 
 def _ask_unit(table: Table, column: str, want: Wanted) -> None:
-    """Refuse a name such as `pos_mm` whose unit is not the one that the description gives the column."""
+    """Raise UserError for a name such as `pos_mm` with another unit than the description of the column."""
     base, mark, unit = column.rpartition("_")
     if not (base and mark and unit in SUFFIXES):
         return
@@ -222,7 +222,7 @@ def _ask_unit(table: Table, column: str, want: Wanted) -> None:
 def _converted(
     table: Table, column: str, values: np.ndarray, theirs: str, want: Wanted, notes: list[str]
 ) -> np.ndarray:
-    """A column in the unit of the file as the description has it."""
+    """Values (n,) of a column converted from the file's unit to the unit of the description."""
     try:
         factor = convert(1.0, theirs, want.unit) * want.scale
     except ValueError as error:
@@ -246,7 +246,7 @@ def _converted(
 
 
 def _seen(table: Table, believed: Believed, columns: Mapping[str, np.ndarray]) -> tuple[dict[str, Any], list[str]]:
-    """The description without the sensors that the file does not show, and a note on each."""
+    """Description without the sensors missing in the file, and a note on each."""
     machine = believed.machine.model_dump(mode="json", exclude_unset=True)
     left = [name for name, s in believed.machine.sensors.items() if s.column not in columns]
     for name in left:
@@ -257,7 +257,7 @@ def _seen(table: Table, believed: Believed, columns: Mapping[str, np.ndarray]) -
 def _case(
     table: Table, plan: Plan, believed: Believed, machine: dict[str, Any], rate: float | None, rows: int
 ) -> tuple[dict[str, Any], list[str]]:
-    """case.json, and what was assumed."""
+    """case.json, and notes on assumptions."""
     notes = []
     given = dict(plan.case)
     tolerance = dict(believed.tolerance)

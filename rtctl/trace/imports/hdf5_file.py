@@ -1,7 +1,7 @@
-"""HDF5, and MATLAB's version 7.3, which is HDF5 with classes of its own.
+"""Reader of HDF5, and of MATLAB 7.3 files, which are HDF5 with MATLAB's classes.
 
-A group is a struct, a compound a struct of its fields. Units are the attributes `unit` or `units` of a dataset.
-In a file of MATLAB references lead to the elements of cells and struct arrays.
+A group is read as a struct, a compound as a struct of its fields. Units are the attributes `unit` or `units` of a
+dataset. In a MATLAB file, references lead to the elements of cells and struct arrays.
 """
 
 from pathlib import Path
@@ -20,7 +20,7 @@ PLAIN = frozenset(  # classes of MATLAB that are numbers, text or made of them
     ("double", "single", "int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64", "logical", "char",
      "cell", "struct", "canonical empty")
 )  # fmt: skip
-DAMAGED = (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError)  # of h5py, at a damaged file
+DAMAGED = (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError)  # raised by h5py for a damaged file
 
 
 def read(path: Path) -> Table:
@@ -61,7 +61,7 @@ class _Reader:
             if isinstance(item, self.h5py.Dataset):
                 sizes.append(int(item.size or 0) * max(item.dtype.itemsize, 8))
 
-        file.visititems(add)  # each object once, soft and external links not at all
+        file.visititems(add)  # visits each object once and skips soft and external links
         return sum(sizes)
 
     def group(self, group: Any, depth: int) -> dict[str, Any]:
@@ -99,7 +99,7 @@ class _Reader:
         return self.values(item, kind)
 
     def struct(self, group: Any, depth: int) -> Any:
-        """A mapping; the elements of a struct array; a sparse matrix."""
+        """Struct as a mapping, struct array as its elements, or sparse matrix."""
         items = [group.get(name) for name in group]
         if self.matlab and "MATLAB_sparse" in group.attrs:
             rows = int(group.attrs["MATLAB_sparse"])
@@ -129,7 +129,7 @@ class _Reader:
             lines = ["".join(map(chr, line)).rstrip() for line in np.atleast_2d(codes)]
             return lines[0] if len(lines) == 1 else lines
         if self.matlab:
-            values = values.T  # MATLAB counts along columns
+            values = values.T  # MATLAB stores column-major
             if values.dtype.names == ("real", "imag"):
                 values = values["real"] + 1j * values["imag"]
         unit = next((_text(item.attrs[key]) for key in ("unit", "units", "Unit", "Units") if key in item.attrs), None)

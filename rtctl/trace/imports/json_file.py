@@ -17,8 +17,8 @@ from rtctl.trace.imports.messages import Messages
 from rtctl.trace.imports.nested import columns_of
 from rtctl.trace.imports.table import Table, row_number
 
-LONGEST = 1 << 20  # characters of a row; a longer first line is a document
-GROWTH = 10  # bytes of memory for a byte of text, where a whole document is taken in at once
+LONGEST = 1 << 20  # characters of a row; a longer first line means one JSON document
+GROWTH = 10  # bytes of memory for each byte of text of a document, estimated
 
 
 def read(path: Path) -> Table:
@@ -33,7 +33,7 @@ def read(path: Path) -> Table:
 
 
 def _line(file: IO[str]) -> str:
-    """The next line that is not blank, up to the longest that a row may have."""
+    """Next non-blank line, up to LONGEST characters."""
     while line := file.readline(LONGEST):
         if line.strip():
             return line
@@ -41,7 +41,7 @@ def _line(file: IO[str]) -> str:
 
 
 def _parsed(text: str) -> Any:
-    """The object or the list of a line; None where the line is none of them."""
+    """Object or list in a line; None where the line is neither."""
     try:
         found = json.loads(text)
     except (ValueError, RecursionError):
@@ -50,7 +50,7 @@ def _parsed(text: str) -> Any:
 
 
 def _is_row(text: str) -> bool:
-    """Whether a line that is alone is a row of single values."""
+    """Whether the only line of a file is a row of single values."""
     found = _parsed(text)
     return isinstance(found, Mapping) and not any(isinstance(item, list | Mapping) for item in found.values())
 
@@ -129,7 +129,7 @@ def _tree(path: Path, value: Any, notes: list[str]) -> Any:
 
 
 def _are_series(items: list[Mapping[str, Any]]) -> bool:
-    """Whether the elements are signals, each with a list of values that is longer than the list of elements."""
+    """Whether the elements are signals: each has a list of values longer than the list of elements."""
     return all(any(isinstance(value, list) and len(value) > len(items) for value in item.values()) for item in items)
 
 

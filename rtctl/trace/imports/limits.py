@@ -1,4 +1,4 @@
-"""Limit on the memory that a foreign file takes, by what the file says of its size before it is unpacked."""
+"""Memory limit for a foreign file, checked by the size declared in the file before unpacking."""
 
 import os
 from pathlib import Path
@@ -10,7 +10,7 @@ DEFAULT = 2.0  # GiB of columns, unpacked; 2.7e8 numbers of 8 bytes
 
 
 def limit() -> int:
-    """Bytes that the columns of one file may take. Raises UserError where the variable holds no number."""
+    """Limit in bytes for the columns of one file. Raises UserError where the environment variable is no number."""
     text = os.environ.get(VARIABLE, "")
     try:
         gib = float(text) if text else DEFAULT
@@ -22,7 +22,7 @@ def limit() -> int:
 
 
 def refuse_large(path: Path, size: float, what: str = "its columns") -> None:
-    """Raise UserError where `size` bytes are more than the limit; `what` takes them."""
+    """Raise UserError where `size` bytes of `what` exceed the limit."""
     if size > limit():
         raise UserError(
             f"{path}: {what} take {readable(size)} in memory and {readable(limit())} are taken at most; write a "
@@ -31,5 +31,5 @@ def refuse_large(path: Path, size: float, what: str = "its columns") -> None:
 
 
 def readable(size: float) -> str:
-    """4.1 GiB, 30 MiB."""
+    """Text of a size in bytes: 4.1 GiB, 30 MiB."""
     return f"{size / 2**30:.3g} GiB" if size >= 2**30 else f"{size / 2**20:.3g} MiB"

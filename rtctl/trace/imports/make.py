@@ -1,4 +1,4 @@
-"""Makes a bundle of a table and a plan: SI units, an even clock, finite numbers, and a case of what is believed."""
+"""Bundle from a table and a plan: SI units, even clock, finite numbers, and a case with the nominal model."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -22,15 +22,15 @@ from rtctl.trace.imports.table import Table
 from rtctl.trace.imports.times import is_date
 from rtctl.trace.part import refuse_taken
 
-OTHER_UNITS = {  # of an axis: what else the model's m, m/s and V may be, all of one recording alike
+OTHER_UNITS = {  # of an axis: alternatives to the model's m, m/s and V, one choice for a recording
     "m": ("m", "rad", "V"),
     "m/s": ("m/s", "rad/s", "V/s"),
     "V": ("V", "A", "N", "Nm"),
 }
 COUNTS = "_counts"
-SLOWEST, FASTEST = 100.0, 1e-7  # s from row to row: beyond them a time without unit is asked about
-LATEST = 1e11  # s since 1970, which is the year 5138: what is later counts milliseconds or less
-SUFFIXES = frozenset(  # units at the end of a name, `time_ms`; u_in and x_min are an input and a least value
+SLOWEST, FASTEST = 100.0, 1e-7  # s from row to row: beyond these limits a time needs a unit
+LATEST = 1e11  # s since 1970 (year 5138): a later time counts milliseconds or less
+SUFFIXES = frozenset(  # unit suffixes of a name, `time_ms`; not `in` or `min`: u_in is an input, x_min a minimum
     ("ns", "us", "\u00b5s", "\u03bcs", "ms", "nm", "um", "\u00b5m", "\u03bcm", "mm", "cm", "km", "deg", "rad", "mrad",
      "rev", "rpm", "Hz", "uV", "mV", "V", "kV", "uA", "mA", "A", "mN", "N", "kN", "mNm", "Nm")
 )  # fmt: skip
@@ -41,13 +41,13 @@ class Imported(NamedTuple):
     rows: int
     rate: float | None  # Hz; None: uneven
     columns: dict[str, str]  # name -> unit
-    notes: tuple[str, ...]  # sentences for people
+    notes: tuple[str, ...]  # sentences for the user
 
 
 def make_bundle(table: Table, plan: Plan, folder: Path | str) -> Imported:
     """Write the bundle of `table` into `folder`, which must not hold one.
 
-    Raises UserError that names file, column and row and says what would be right; nothing is written then.
+    Writes nothing and raises UserError with file, column, row and remedy for an invalid table.
     """
     folder = Path(folder)
     if plan.plant is None:
@@ -77,12 +77,12 @@ def make_bundle(table: Table, plan: Plan, folder: Path | str) -> Imported:
 
 
 def known_columns(plant: str) -> dict[str, Column]:
-    """What a recording of this machine may hold."""
+    """Columns that a recording of this machine may hold, by name."""
     return {column.name: column for column in (*machines.MODULES[plant].COLUMNS, *profile_of(plant).truth)}
 
 
 def _wanted(table: Table, plan: Plan, known: dict[str, Column]) -> dict[str, ColumnPlan]:
-    """Our columns and theirs: as the plan says, or those that have our names already where it names none."""
+    """File column for each rtctl column: by the plan, or by equal name where the plan has no columns."""
     named = {name: given for name, given in plan.columns.items() if given.column}
     if not set(named) - {"t"}:
         named = {**{name: ColumnPlan(column=name) for name in table.columns if name in known}, **named}
@@ -109,7 +109,7 @@ def _wanted(table: Table, plan: Plan, known: dict[str, Column]) -> dict[str, Col
 def _signals(
     table: Table, wanted: dict[str, ColumnPlan], plan: Plan, known: dict[str, Column]
 ) -> tuple[dict[str, np.ndarray], dict[str, str], list[str]]:
-    """Columns in SI by our names, their units, and what was assumed."""
+    """Columns in SI by rtctl name, their units, and notes on assumptions."""
     columns: dict[str, np.ndarray] = {}
     units: dict[str, str] = {}
     assumed = []
@@ -142,7 +142,7 @@ def _signals(
 
 
 def one_length(table: Table, columns: dict[str, np.ndarray], origin: Mapping[str, ColumnPlan]) -> None:
-    """Raise UserError where columns are of several lengths, or hold no rows; `origin` has the mapping of each."""
+    """Raise UserError where columns differ in length or hold no rows; `origin` maps rtctl names to file columns."""
     lengths = {name: len(values) for name, values in columns.items()}
     first = next(iter(columns))
     for name, length in lengths.items():
@@ -164,7 +164,7 @@ def times_of(table: Table, column: str, theirs: str | None) -> np.ndarray:
     ask_suffix(table, "t", column, "s", ("s",))
     t = table.times(column, 1.0)
     step = float(np.median(np.abs(np.diff(t)))) if len(t) > 1 else 0.0
-    begin = abs(float(table.columns[column][0])) if len(t) else 0.0  # of integers, which are counted from the first
+    begin = abs(float(table.columns[column][0])) if len(t) else 0.0  # integers are counted from the first row
     if step > SLOWEST or 0.0 < step < FASTEST or begin > LATEST:
         what = f"it begins at {begin:.6g} s" if begin > LATEST else f"its rows would be {step:.6g} s apart"
         raise UserError(
@@ -175,8 +175,7 @@ def times_of(table: Table, column: str, theirs: str | None) -> np.ndarray:
 
 
 def ask_suffix(table: Table, name: str, column: str, ours: str, choices: Sequence[str]) -> None:
-    """Refuse a name such as `pos_mm` that ends in another unit of one of the dimensions that it may be in, where no
-    unit is given."""
+    """Raise UserError for a column without unit whose name, such as `pos_mm`, ends in another unit of its dimension."""
     base, mark, unit = column.rpartition("_")
     if not (base and mark and unit in SUFFIXES):
         return
@@ -193,7 +192,7 @@ def ask_suffix(table: Table, name: str, column: str, ours: str, choices: Sequenc
 
 
 def unit_factor(table: Table, name: str, column: str, theirs: str, choices: Sequence[str]) -> tuple[float, str]:
-    """What turns the file's unit into ours, and ours: the first of `choices` that fits."""
+    """Factor from the file's unit to the rtctl unit, and the rtctl unit: the first of `choices` that fits."""
     first: ValueError | None = None
     if theirs in choices:
         return 1.0, theirs
@@ -203,7 +202,7 @@ def unit_factor(table: Table, name: str, column: str, theirs: str, choices: Sequ
         except ValueError as error:
             first = first or error
     wanted = choices[0] or "a number without unit"
-    given = f"in '{theirs}'" if theirs else "a mere number by the file"
+    given = f"in '{theirs}'" if theirs else "a number without unit"
     raise UserError(
         f"{table.path}: column '{column}' ({name}) is {given}, which is not {wanted}; --unit {name}=... says what it is"
     ) from first
@@ -219,12 +218,12 @@ def whole(table: Table, column: str, values: np.ndarray) -> None:
 
 
 def clock_of(table: Table, plan: Plan, columns: dict[str, np.ndarray]) -> tuple[np.ndarray, float | None, list[str]]:
-    """Times (n,) s, the rate (None where they are uneven and may be), and notes."""
+    """Times (n,) in s, rate in Hz (None for permitted uneven times), and notes."""
     n = len(next(iter(columns.values())))
     if "t" not in columns:
         if plan.rate is None:
             raise UserError(
-                f"{table.path}: which column is the time? --map t=NAME says it, or --rate 1000 where none is"
+                f"{table.path}: no time column; name it with --map t=NAME, or give the rate, e.g. --rate 1000"
             )
         return np.arange(n) / plan.rate, plan.rate, []
     t = columns["t"]

@@ -1,7 +1,7 @@
-"""MATLAB's files: versions 4 and 5 by scipy, version 7.3, which is HDF5, by h5py where it is installed.
+"""Reader of MATLAB files: versions 4 and 5 with scipy, version 7.3 (HDF5) with h5py where it is installed.
 
-A field of a struct is `s.x`, an element of a struct array or a cell `s.1`, a column of a matrix `y.1`. Units are those
-of a struct `units` beside the signals, as `rtctl trace export --to mat` writes it, or of a text `Unit` beside the data.
+A field of a struct is `s.x`, an element of a struct array or a cell `s.1`, a column of a matrix `y.1`. Units come from
+a struct `units` beside the signals, as `rtctl trace export --to mat` writes it, or from a text `Unit` beside the data.
 """
 
 import warnings
@@ -33,12 +33,12 @@ def read(path: Path) -> Table:
         return table_of(path, matlab_tree(path))
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of variables of one name
+            warnings.simplefilter("ignore")  # about duplicate variable names
             check_size(path)
             found = loadmat(path, simplify_cells=True)
     except (OSError, UserError):
         raise
-    except Exception:  # whatever a damaged file makes of the reader
+    except Exception:  # scipy raises any type for a damaged file
         raise UserError(
             f"{path} cannot be read as a MATLAB file: it is damaged, cut off or of another kind; save it again"
         ) from None
@@ -46,7 +46,7 @@ def read(path: Path) -> Table:
 
 
 def table_of(path: Path, found: Mapping[str, Any]) -> Table:
-    """Table of the variables; `columns` and `case_json` of our own export are the names and no signals."""
+    """Table of the variables; `columns` and `case_json` of an rtctl export are no signals."""
     names = found.get("columns")
     own = {k: v for k, v in names.items() if isinstance(v, str)} if isinstance(names, Mapping) else {}
     rest = {key: value for key, value in found.items() if not (own and key in ("columns", "help", "case_json"))}
@@ -61,12 +61,12 @@ def table_of(path: Path, found: Mapping[str, Any]) -> Table:
 
 
 def object_of(kind: str) -> Refused:
-    """A variable of a class of MATLAB."""
+    """Refusal of a variable of a MATLAB class."""
     return Refused(OBJECT.format(kind))
 
 
 def _plain(value: Any) -> Any:
-    """Objects that scipy does not understand, by their class; all else as it is."""
+    """Refusals for MATLAB objects that scipy cannot read; other values unchanged."""
     if isinstance(value, MatlabOpaque):
         found = np.asarray(value).ravel()[0]
         return object_of(_text(found["s2"]))
@@ -76,7 +76,7 @@ def _plain(value: Any) -> Any:
         out: dict[str, Any] = {}
         for key, item in value.items():
             if isinstance(item, MatlabOpaque):
-                key = _text(np.asarray(item).ravel()[0]["s0"]) or key  # scipy calls every such variable None
+                key = _text(np.asarray(item).ravel()[0]["s0"]) or key  # scipy names every MATLAB object None
             out[str(key)] = _plain(item)
         return out
     if isinstance(value, list):
@@ -93,4 +93,4 @@ def _text(value: Any) -> str:
 def _is_hdf5(path: Path) -> bool:
     with path.open("rb") as file:
         head = file.read(520)
-    return head.startswith(HDF5) or head[512:520] == HDF5  # MATLAB puts a text of its own in front
+    return head.startswith(HDF5) or head[512:520] == HDF5  # MATLAB writes a text before the HDF5 signature

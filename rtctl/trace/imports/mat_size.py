@@ -1,4 +1,4 @@
-"""Size of a MATLAB file of version 4 or 5, by the tags of its variables, before any of them is unpacked."""
+"""Unpacked size of a MATLAB file of version 4 or 5, from the tags of its variables."""
 
 import zlib
 from pathlib import Path
@@ -9,16 +9,16 @@ from scipy.io import whosmat
 from rtctl.trace.imports.limits import refuse_large
 
 HEADER = 128  # bytes before the first variable
-COMPRESSED = 15  # type of an element
+COMPRESSED = 15  # element type
 PROBE = 4096  # compressed bytes that hold at least the first tag
 WIDTHS = {"int8": 1, "uint8": 1, "int16": 2, "uint16": 2, "int32": 4, "uint32": 4, "single": 4, "logical": 1, "char": 4}
 
 
 def check_size(path: Path) -> None:
-    """Raise UserError where the variables take more than the limit. Other errors are those of a damaged file."""
+    """Raise UserError where the variables exceed the memory limit. Other errors mean a damaged file."""
     try:
         variables = whosmat(path)
-    except TypeError:  # an object of MATLAB has no shape
+    except TypeError:  # a MATLAB object has no shape
         variables = []
     size = 0
     for _, shape, kind in variables:
@@ -32,7 +32,7 @@ def check_size(path: Path) -> None:
 
 
 def _unpacked(file: IO[bytes]) -> int:
-    """Bytes of all variables of a file of version 5 once they are unpacked; 0 for another version."""
+    """Unpacked bytes of all variables of a version 5 file; 0 for another version."""
     head = file.read(HEADER)
     order = {b"IM": "little", b"MI": "big"}.get(head[126:128])
     if order is None or not all(head[:4]):

@@ -1,7 +1,7 @@
-"""MCAP with JSON or protobuf messages. With one topic a column is a field, `ref`, with several it is `/topic/ref`.
+"""Reader of MCAP with JSON or protobuf messages. A column is `ref` with one topic, `/topic/ref` with several.
 
-Where no field is the time, the log time is, in seconds from the first message on: the column `log_time`. A file that is
-cut off gives the messages that are whole.
+Where no field is the time, the column `log_time` is: log time in seconds from the first message. A truncated file gives
+its whole messages.
 """
 
 import json
@@ -92,7 +92,7 @@ def read(path: Path) -> Table:
                     topics[channel.topic].add(record)
     except (OSError, UserError):
         raise
-    except Exception:  # whatever a damaged file makes of the reader
+    except Exception:  # the reader raises any type for a damaged file
         raise UserError(f"{path} cannot be read as MCAP: it is damaged") from None
     left = {channels[k].topic: _other(channels[k], schemas, count) for k, count in others.items()}
     whole = sum(len(topic.times) for topic in topics.values())
@@ -122,7 +122,9 @@ def _table(path: Path, topics: dict[str, _Topic], notes: list[str], left: dict[s
         units[before + TIME] = "s"
         stamps = [before + key for key, values in found.items() if values.dtype.kind == "m"]
         if stamps:
-            notes.append(f"{', '.join(stamps)} is a time too, of the sender: --map t={stamps[0]} takes it as the clock")
+            notes.append(
+                f"{', '.join(stamps)} is also a time, of the sender; take it as the clock with --map t={stamps[0]}"
+            )
     return Table(
         path, columns, units, clock=TIME if len(topics) == 1 else "", where=lambda row: f"message {row + 1}",
         notes=(*notes, *notes_of(left)), left={**words, **left},
@@ -130,7 +132,7 @@ def _table(path: Path, topics: dict[str, _Topic], notes: list[str], left: dict[s
 
 
 def _other(channel: Channel, schemas: dict[int, Schema], count: int) -> str:
-    """What the messages of a channel are."""
+    """Number, encoding and schema of the messages of a channel, as text."""
     schema = schemas.get(channel.schema_id)
     named = f", schema {schema.name} ({schema.encoding or 'no encoding'})" if schema else ""
     return f"{count} messages in {channel.message_encoding or 'an unknown encoding'}{named}"
@@ -151,7 +153,7 @@ def _nothing(
 
 
 def _units(schema: bytes) -> list[tuple[str, str]]:
-    """Unit of each property, as `rtctl trace export --to mcap` writes them; nested ones as `a.x`."""
+    """Unit of each property, as `rtctl trace export --to mcap-json` writes them; nested properties as `a.x`."""
     try:
         return _nested(json.loads(schema), "", 0)
     except (ValueError, RecursionError):

@@ -1,7 +1,6 @@
-"""Records of an MCAP file as they lie in it, up to the place where it ends or is damaged.
+"""Records of an MCAP file in file order, up to its end or its first damage.
 
-Chunks are unpacked no further than the limit on memory. The last chunk of a file that is cut off gives the messages
-that are whole in it.
+Chunks are unpacked up to the memory limit. The last chunk of a truncated file gives its whole messages.
 
 Source: MCAP specification (mcap.dev/spec).
 """
@@ -25,13 +24,13 @@ CHUNK_HEAD = 28  # bytes of a chunk before the name of its compression
 
 
 class Cut(NamedTuple):
-    """Where reading ended before the end of the data."""
+    """Position where reading ended before the end of the data."""
 
     byte: int
 
 
 def records(path: Path, file: IO[bytes]) -> Iterator[Schema | Channel | Message | Cut]:
-    """Schemas, channels and messages in the order of the file; a Cut is the last one. Raises UserError."""
+    """Schemas, channels and messages in file order; a Cut comes last where the file is damaged. Raises UserError."""
     if file.read(len(MAGIC)) != MAGIC:
         raise UserError(f"{path} cannot be read as MCAP: it does not begin as one")
     end = path.stat().st_size
@@ -60,7 +59,7 @@ def records(path: Path, file: IO[bytes]) -> Iterator[Schema | Channel | Message 
 
 
 def _parsed(data: bytes) -> Iterator[Schema | Channel | Message]:
-    """Records of an unpacked chunk, as far as they are whole."""
+    """Whole records of an unpacked chunk."""
     at = 0
     while at + HEAD <= len(data):
         opcode, length = struct.unpack_from("<BQ", data, at)
@@ -83,7 +82,7 @@ def _record(opcode: int, data: bytes) -> Any:
 
 
 def _chunk(path: Path, data: bytes, left: int) -> tuple[int, bytes]:
-    """Size that the chunk says and its records, as many of them as there are. `left` bytes may be taken."""
+    """Declared size of a chunk and its existing records; at most `left` bytes."""
     if len(data) < CHUNK_HEAD + 4:
         return 0, b""
     _, _, size, _, name = struct.unpack_from("<QQQII", data)

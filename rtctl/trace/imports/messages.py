@@ -15,8 +15,8 @@ from rtctl.trace.imports.table import is_number
 
 STAMPS = (("sec", "nanosec"), ("secs", "nsecs"), ("sec", "nsec"), ("seconds", "nanos"))
 CELL = 40  # bytes of a number in a list of Python
-CHECKED = 4096  # messages between two looks at the size
-TOLD = 5  # columns whose gaps are told
+CHECKED = 4096  # messages between two checks of the memory size
+TOLD = 5  # columns whose gaps are listed in notes
 
 
 class Stamp(int):
@@ -25,22 +25,22 @@ class Stamp(int):
 
 class Columns(NamedTuple):
     values: dict[str, np.ndarray]  # (n,) each
-    gaps: tuple[str, ...]  # sentences on values that are missing
-    left: dict[str, str]  # what is no column -> why
+    gaps: tuple[str, ...]  # sentences on missing values
+    left: dict[str, str]  # name that became no column -> reason
 
 
 class Messages:
-    """Rows that are added one by one. `what` is a row in messages to people."""
+    """Rows that are added one by one. `what` names rows in messages to the user."""
 
     def __init__(self, path: Path, what: str = "messages") -> None:
         self.path, self.what, self.rows = path, what, 0
         self._lists: dict[str, list[Any]] = {}
 
     def add(self, message: Any) -> None:
-        """Add a row. Raises UserError where all rows take more memory than they may."""
+        """Add a row. Raises UserError where the rows exceed the memory limit."""
         for name, value in _flat(message, ""):
             values = self._lists.setdefault(name, [])
-            if len(values) > self.rows:  # a name that is there twice
+            if len(values) > self.rows:  # the name is twice in the message
                 values[self.rows] = value
                 continue
             values.extend([None] * (self.rows - len(values)))

@@ -1,6 +1,6 @@
-"""ASAM MDF, versions 3 and 4, by asammdf: a column for each channel, with its unit; the master channel is the clock.
+"""Reader of ASAM MDF, versions 3 and 4, with asammdf: a column for each channel; the master channel is the clock.
 
-Channel groups that share one clock are one. With several clocks a column is `group/name`.
+Channel groups with a common clock are joined. With several clocks a column is `group/name`.
 """
 
 import gc
@@ -17,7 +17,7 @@ from rtctl.trace.imports.nested import notes_of, unit_text
 from rtctl.trace.imports.table import Table
 
 TIME = "time"  # where the master has no name
-TIME_MASTERS = (0, 1)  # sync types of MDF 4: none told, time
+TIME_MASTERS = (0, 1)  # sync types of MDF 4: none, time
 
 
 class _Clock(NamedTuple):
@@ -32,15 +32,15 @@ class _Clock(NamedTuple):
 
 def read(path: Path) -> Table:
     """The columns of all groups. Raises UserError, OSError."""
-    hook, sys.unraisablehook = sys.unraisablehook, lambda _: None  # the destructor fails where a file did not open
+    hook, sys.unraisablehook = sys.unraisablehook, lambda _: None  # asammdf's destructor fails after a failed open
     try:
         with MDF(path) as mdf:
             refuse_large(path, sum(_size(group) for group in mdf.groups), "its channels")
             return _table(path, mdf)
     except (OSError, UserError):
         raise
-    except Exception:  # whatever a damaged file makes of the reader
-        pass  # its traceback holds the reader, which goes here
+    except Exception:  # asammdf raises any type for a damaged file
+        pass  # raising below frees the reader, which this traceback holds
     finally:
         gc.collect()
         sys.unraisablehook = hook
@@ -82,7 +82,7 @@ def _table(path: Path, mdf: Any) -> Table:
 
 
 def _clocks(mdf: Any) -> list[_Clock]:
-    """Groups by their master; groups with the same times are together."""
+    """Clocks: channel groups joined by equal times of their master."""
     found: list[_Clock] = []
     for number, group in enumerate(mdf.groups):
         if not group.channels:
@@ -105,7 +105,7 @@ def _clocks(mdf: Any) -> list[_Clock]:
 
 
 def _channel(mdf: Any, group: int, index: int, rows: int) -> tuple[np.ndarray | None, str, str]:
-    """Values (n,) by the channel's conversion and its unit, or None and the reason."""
+    """Converted values (n,), unit and "" of a channel; or None, "" and the reason."""
     signal = mdf.get(group=group, index=index, ignore_invalidation_bits=True)
     values = np.asarray(signal.samples)
     unit = str(signal.unit or "")

@@ -11,10 +11,10 @@ NO_UNIT = ("-", "1", "none", "")
 
 
 def named(text: str, number: int) -> tuple[str, str | None]:
-    """Name and unit of a title; the number of the column, from 1, where it is empty; None where no unit is given.
+    """Name and unit of a column title; an empty name becomes `number` (from 1); the unit is None where none is given.
 
-    After a slash and after `in` only a unit that is known counts. The whole title is the name then: ISO 80000 writes
-    quantity / unit, and an owner maps what the file shows.
+    After a slash or `in`, only a known unit counts. The name is then the whole title: ISO 80000 writes quantity / unit,
+    and the user maps the title in the file.
     """
     if match := BRACKETS.fullmatch(text):
         unit = match[2] if match[2] is not None else match[3]
@@ -26,7 +26,7 @@ def named(text: str, number: int) -> tuple[str, str | None]:
 
 
 def is_unit(text: str) -> bool:
-    """Whether it is a unit that is known."""
+    """Whether `text` is a known unit."""
     try:
         convert(1.0, text, text)
     except ValueError:

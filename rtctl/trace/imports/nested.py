@@ -1,8 +1,8 @@
 """Columns of nested data: structs, struct arrays, cells, matrices, records.
 
 A field is `s.x`, an element of a struct array or a cell `s.1`, a column of a matrix `y.1`, of an array with three
-indices `y.1.2`. An element with a text `Name` or `label` beside its one array is also reachable by that text. Whatever
-is no column is in `left`, with the reason.
+indices `y.1.2`. An element with a text `Name` or `label` beside its one array is also reachable by that text. `left`
+holds every other name with the reason.
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,21 +16,21 @@ from rtctl.trace.imports.limits import limit
 NAMES = ("name", "label", "title")  # fields of an element that name it, in any case
 UNITS = ("unit", "units")
 NO_UNIT = ("-", "1", "none", "")
-DEEPEST = 32  # levels; a file may refer to itself
-TOLD = 5  # names that are told with their reason
+DEEPEST = 32  # levels; bounds files that refer to themselves
+TOLD = 5  # names listed with their reason
 NUMBERS = "fiubMm"
 ONE_VALUE = "one value and no column"
 
 
 class Valued(NamedTuple):
-    """Something with its unit as the file writes it."""
+    """Value with its unit as written in the file."""
 
     values: Any
     unit: str
 
 
 class Refused(NamedTuple):
-    """Something that the reader of a file does not turn into numbers, and why."""
+    """Reason why the reader did not convert an item to numbers."""
 
     why: str
 
@@ -38,16 +38,16 @@ class Refused(NamedTuple):
 class Tree(NamedTuple):
     columns: dict[str, np.ndarray]  # (n,) each, in the file's own type
     units: dict[str, str]
-    left: dict[str, str]  # what is no column -> why
+    left: dict[str, str]  # name that became no column -> reason
     lost: list[str]  # names in `left` that hold data
 
     def notes(self) -> tuple[str, ...]:
-        """What was left out, one sentence each."""
+        """Sentences on names in `lost`."""
         return notes_of({name: self.left[name] for name in self.lost})
 
 
 def notes_of(left: Mapping[str, str]) -> tuple[str, ...]:
-    """Sentences on what is no column, {name: why}; the first few in full, the others by name."""
+    """Sentences on names that became no column, {name: reason}; the first TOLD with reason, the others by name."""
     told = [f"{name} is no column: {why}" for name, why in list(left.items())[:TOLD]]
     others = list(left)[TOLD:]
     if others:
@@ -63,7 +63,7 @@ def columns_of(found: Mapping[str, Any]) -> Tree:
 
 
 def unit_text(text: str) -> str:
-    """A unit as it stands in a file; `-` and `1` are numbers without unit."""
+    """Unit as written in a file; "" for `-` and `1`, numbers without unit."""
     text = text.strip()
     return "" if text.lower() in NO_UNIT else text
 
@@ -117,7 +117,7 @@ def _mapping(tree: Tree, value: Mapping[str, Any], before: str, depth: int) -> N
         for key, text in table.items():
             name = f"{before}{key}"
             mine = (column for column in made if column == name or column.startswith(f"{name}."))
-            if isinstance(text, str) and text.strip():  # an empty text says nothing
+            if isinstance(text, str) and text.strip():  # an empty text is no unit
                 tree.units.update(dict.fromkeys(mine, unit_text(text)))
     if len(made) == 1 or (made and all(name.rpartition(".")[0] == made[0].rpartition(".")[0] for name in made)):
         for key in UNITS:
@@ -141,7 +141,7 @@ def _is_texts(item: Any) -> bool:
 
 
 def _elements(tree: Tree, items: list[Any], name: str, depth: int) -> None:
-    """Elements of a cell or of a struct array; numbers and texts in a row are one column."""
+    """Elements of a cell or a struct array; a sequence of numbers or texts is one column."""
     if not items:
         tree.left[name] = "empty"
     elif all(_is_number(item) for item in items):
@@ -181,7 +181,7 @@ def _array(tree: Tree, value: np.ndarray, name: str, depth: int) -> None:
 
 
 def _columns(tree: Tree, value: np.ndarray, name: str) -> None:
-    """Rows are along the longest index, the first of them where two are as long."""
+    """Columns of an array; rows run along the longest index, the first one of equal lengths."""
     value = np.squeeze(value)
     if value.ndim <= 1:
         tree.columns[name] = value.reshape(-1)

@@ -1,4 +1,4 @@
-"""numpy's archive: an array for each column, or a matrix whose columns are `name.1`, `name.2`; or one array, `.npy`."""
+"""Reader of numpy archives: an array a column, or a matrix with columns `name.1`, `name.2`; or one array, `.npy`."""
 
 import zipfile
 from pathlib import Path
@@ -19,13 +19,13 @@ def read(path: Path) -> Table:
     """The columns of an archive. Nothing in it is ever run. Raises UserError, OSError."""
     with path.open("rb") as file:
         alone = file.read(len(npy.MAGIC_PREFIX)) == npy.MAGIC_PREFIX
-    if not alone and not zipfile.is_zipfile(path):  # numpy would speak of pickles instead
+    if not alone and not zipfile.is_zipfile(path):  # numpy's own message would be about pickles
         raise UserError(f"{path} cannot be read as npz: it is no archive of arrays; np.savez makes one")
     try:
         found = {"column": _alone(path)} if alone else _archive(path)
     except (OSError, UserError):
         raise
-    except Exception:  # whatever a damaged file makes of the reader
+    except Exception:  # numpy raises any type for a damaged file
         raise UserError(f"{path} cannot be read as npz: it is damaged; write it again with np.savez") from None
     tree = columns_of(found)
     return Table(path, tree.columns, tree.units, notes=tree.notes(), left=tree.left)
@@ -54,7 +54,7 @@ def _archive(path: Path) -> dict[str, Any]:
 
 
 def _array(path: Path, file: IO[bytes], size: int, name: str) -> Any:
-    """One array; the header is compared with the bytes that are there before memory is taken."""
+    """One array; its header is checked against the existing bytes before allocation."""
     version = npy.read_magic(file)
     shape, fortran, dtype = (npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0)(file)
     if dtype.hasobject:

@@ -1,7 +1,7 @@
-"""Numbers as text: the decimal sign of a whole file, and thousands that are grouped.
+"""Numbers as text: decimal sign of a whole file, and grouped thousands.
 
-One decisive cell anywhere decides for the file: `0,5`, `12.25` and `1,234.5` can be read in one way only. `1,980` alone
-cannot; where nothing else decides, it is refused.
+One unambiguous cell decides for the file: `0,5`, `12.25` and `1,234.5` have one reading. `1,980` has two: a file with
+only ambiguous cells is refused.
 """
 
 import re
@@ -18,7 +18,7 @@ EXPONENT = r"(?:[eEdD][-+]?\d+)?"
 
 
 def _decides(sign: str, other: str) -> str:
-    """Pattern of cells in which `sign` can only be the decimal sign."""
+    """Regular expression of cells where `sign` must be the decimal sign."""
     s, o = re.escape(sign), re.escape(other)
     group = f"[{o}{SPACES}]"
     return (
@@ -28,7 +28,7 @@ def _decides(sign: str, other: str) -> str:
 
 
 def _grouped(sign: str, least: int) -> str:
-    """Pattern of cells that `sign` may group, `least` times or more."""
+    """Regular expression of cells with `sign` between thousands at least `least` times."""
     return rf"^[-+]?\d{{1,3}}(?:{re.escape(sign)}\d{{3}}){{{least},}}$"
 
 
@@ -39,10 +39,9 @@ TWICE = {sign: _grouped(sign, 2) for sign in OTHER}
 
 
 def decimal_sign(path: Path, columns: Sequence[pa.ChunkedArray], where: Callable[[str], str]) -> str:
-    """Decimal sign of a file by all cells of its columns of texts.
+    """Decimal sign of a file, from all cells of its text columns.
 
-    `where(text)` names the first row with that cell. Raises UserError where the cells contradict each other, or leave
-    the sign open.
+    `where(text)` names the first row with the cell `text`. Raises UserError for contradictory or ambiguous cells.
     """
     bare = [pc.utf8_trim_whitespace(column) for column in columns]
     found: dict[str, str] = {}
@@ -69,7 +68,7 @@ def decimal_sign(path: Path, columns: Sequence[pa.ChunkedArray], where: Callable
 
 
 def _first(columns: Sequence[pa.ChunkedArray], pattern: str) -> str:
-    """The first cell that matches; empty where none does."""
+    """First matching cell; "" without a match."""
     for column in columns:
         row = pc.index(pc.match_substring_regex(column, pattern), True).as_py()
         if row >= 0:
@@ -78,7 +77,7 @@ def _first(columns: Sequence[pa.ChunkedArray], pattern: str) -> str:
 
 
 def numbers(column: pa.ChunkedArray, decimal: str) -> pa.ChunkedArray | None:
-    """Doubles of a column of texts, null where a cell is empty; None where some cell is no number."""
+    """Doubles of a text column, null for an empty cell; None where any cell is no number."""
     other = OTHER[decimal]
     bare = pc.utf8_trim_whitespace(column)
     for sign in (other, *SPACES):

@@ -1,4 +1,4 @@
-"""Files packed by gzip, bzip2 or xz, by their first bytes: unpacked into a private folder, up to the limit."""
+"""Reader of gzip, bzip2 and xz files, detected by first bytes and unpacked into a private folder up to the limit."""
 
 import bz2
 import gzip
@@ -25,7 +25,7 @@ PIECE = 1 << 20
 
 
 class _Folder:
-    """Private folder that goes with the last reference to it."""
+    """Private folder, deleted with its last reference."""
 
     def __init__(self) -> None:
         self.path = Path(tempfile.mkdtemp(prefix="rtctl-import-"))
@@ -33,12 +33,12 @@ class _Folder:
 
 
 def packing(head: bytes) -> str:
-    """Name of the packing that a file with these first bytes has; empty for none."""
+    """Compression of a file with these first bytes; "" without compression."""
     return next((name for magic, (name, _) in OPENERS.items() if head.startswith(magic)), "")
 
 
 def read_packed(path: Path, read: Callable[[Path], Table]) -> Table:
-    """Table of the file in `path` by `read`. Raises UserError, OSError."""
+    """Table of the unpacked file, read by `read`. Raises UserError, OSError."""
     with path.open("rb") as file:
         head = file.read(8)
     kind, opener = next(found for magic, found in OPENERS.items() if head.startswith(magic))
@@ -57,7 +57,7 @@ def read_packed(path: Path, read: Callable[[Path], Table]) -> Table:
         raise type(error)(str(error).replace(str(inner), str(path))) from None
 
     def where(row: int, kept: _Folder = folder) -> str:
-        return table.where(row)  # lines are counted in the unpacked file, which is there as long as the table is
+        return table.where(row)  # reads line numbers from the unpacked file, kept as long as the table
 
     return table._replace(path=path, where=where)
 

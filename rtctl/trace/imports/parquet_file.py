@@ -1,4 +1,4 @@
-"""Parquet and Arrow, from rtctl or from anywhere. Units are in the metadata of each column: `unit` or `units`.
+"""Reader of Parquet and Arrow files. Units are in the metadata of each column: `unit` or `units`.
 
 A field of a struct is `a.x`, an element of a list `a.1` where all lists are of one length. Dates and durations keep
 their type.
@@ -22,7 +22,7 @@ ARROW = b"ARROW1"
 
 
 class Part(NamedTuple):
-    """A column of numbers, or the reason why it is none."""
+    """Column of numbers, or the reason why it became no column."""
 
     name: str
     values: np.ndarray | None
@@ -99,7 +99,7 @@ def _parts(name: str, column: pa.ChunkedArray) -> Iterator[Part]:
     elif pa.types.is_struct(kind):
         for k in range(kind.num_fields):
             field = kind.field(k)
-            chunks = [pc.struct_field(chunk, [k]) for chunk in column.chunks]  # nulls of the struct are the field's
+            chunks = [pc.struct_field(chunk, [k]) for chunk in column.chunks]  # a null struct makes its fields null
             yield from _parts(f"{name}.{field.name}", pa.chunked_array(chunks, field.type))
     elif pa.types.is_list(kind) or pa.types.is_large_list(kind) or pa.types.is_fixed_size_list(kind):
         yield from _listed(name, column)

@@ -1,9 +1,9 @@
-"""What the owner says of a foreign recording: which column is which, in what unit, and what is known of the machine.
+"""Import plan of the user for a foreign recording: mapping and units of columns, and the nominal model.
 
 plant: axis
 rate: 1 kHz                       # where the file has no time
 columns:
-  u: vir                          # ours: theirs
+  u: vir                          # rtctl name: name in the file
   x: {column: qm, unit: mm}
 parameters: {M: 95 kg}
 case: {drive: {newton_per_volt: 35.15}}     # further keys of case.json
@@ -48,7 +48,7 @@ class Plan(Settings):
 
 
 def load_plan(path: Path | str) -> Plan:
-    """The plan of a YAML file. Raises UserError with file and line."""
+    """Plan from a YAML file. Raises UserError with file and line."""
     document = load_yaml(path)
     data = {} if document.data is None else document.data
 
@@ -65,7 +65,7 @@ def load_plan(path: Path | str) -> Plan:
 
 
 def _check_columns(columns: Any, where: Callable[[tuple], str]) -> None:
-    """What the words for a whole plan cannot say: they know keys that a class has, not names that a person chose."""
+    """Raise UserError for invalid `columns`; the general check knows only fixed keys, not names chosen by the user."""
     if not isinstance(columns, dict):
         raise UserError(f"{where(('columns',))}: columns: write one line for each, such as x: qm")
     for name, given in columns.items():
@@ -92,7 +92,7 @@ def with_options(
     uneven: bool,
     text: Mapping[str, Any] = MappingProxyType({}),
 ) -> Plan:
-    """The plan with what the command line says on top. Raises UserError."""
+    """Plan with the options of the command line, which take precedence. Raises UserError."""
     columns = dict(plan.columns)
     mapped: dict[str, str] = {}
     for option in maps:
@@ -117,7 +117,7 @@ def with_options(
 
 
 def plan_of(data: Mapping[str, Any], where: Callable[[tuple], str] | None = None) -> Plan:
-    """The plan of plain data; `where` says how a key is called in a message. Raises UserError."""
+    """Plan from plain data; `where` names a key in a message. Raises UserError."""
     try:
         return Plan.model_validate(data)
     except ValidationError as error:
@@ -125,7 +125,7 @@ def plan_of(data: Mapping[str, Any], where: Callable[[tuple], str] | None = None
 
 
 def _option(at: tuple) -> str:
-    """The option that a key of the plan is given by."""
+    """Command-line option for a key of the plan."""
     names = [str(part) for part in at if part != "text"]
     return f"--{names[0].replace('_', '-')}" if names else "import"
 

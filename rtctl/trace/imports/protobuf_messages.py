@@ -1,8 +1,7 @@
-"""Protobuf messages of one MCAP topic, by the descriptor in the file, as rows of nested names.
+"""Protobuf messages of one MCAP topic, decoded by the descriptor in the file, as rows of nested names.
 
-Messages of one length whose fields all have fixed widths, as `rtctl trace export --to mcap` writes them, are taken as
-one array. Any other message is decoded alone. A field that is absent and has presence is missing; one without presence
-has its default, as protobuf says.
+Messages of one length with fields of fixed width, as `rtctl trace export --to mcap` writes them, are read as one array.
+Other messages are decoded one by one. An absent field with presence is missing; one without presence has its default.
 """
 
 from collections.abc import Mapping
@@ -19,38 +18,38 @@ from rtctl.trace.imports.nested import unit_text
 
 STAMP = "google.protobuf.Timestamp"
 SPAN = "google.protobuf.Duration"
-DEEPEST = 16  # levels; a message may hold itself
+DEEPEST = 16  # levels; bounds recursive messages
 
 
 class ProtobufRows:
-    """Messages that are added one by one. Raises UserError where the descriptor is damaged."""
+    """Messages that are added one by one. Raises UserError for a damaged descriptor."""
 
     def __init__(self, path: Path, topic: str, name: str, descriptor: bytes) -> None:
         self._path, self._topic, self._data, self._bytes = path, topic, [], 0  # type: ignore[var-annotated]
         try:
             self._file, self._type = _type(name, descriptor)
-        except Exception:  # whatever protobuf makes of a damaged descriptor
-            raise UserError(f"{path}: the descriptor of {topic} gives no message {name}; it is damaged") from None
+        except Exception:  # protobuf raises any type for a damaged descriptor
+            raise UserError(f"{path}: the descriptor of {topic} has no message {name}; the file is damaged") from None
         self._told = [_told(self._file, n, field.name) for n, field in enumerate(self._type.DESCRIPTOR.fields)]
 
     def add(self, data: bytes) -> None:
-        """Add a message. Raises UserError where all of them take more memory than they may."""
+        """Add a message. Raises UserError where the messages exceed the memory limit."""
         self._data.append(data)
         self._bytes += len(data)
         if len(self._data) % 4096 == 0:
             refuse_large(self._path, self._bytes, f"its messages of {self._topic}")
 
     def units(self) -> dict[str, str]:
-        """Unit of each field whose comment begins with one, `[rad] reference`."""
+        """Unit of each field whose comment begins with a unit, `[rad] reference`."""
         return {name: unit_text(unit) for name, unit in self._told if unit}
 
     def columns(self) -> Columns:
-        """Columns, nan or None where a message has no value. Raises UserError for a message that is none."""
+        """Columns, nan or None where a message has no value. Raises UserError for an invalid message."""
         packed = self._packed()
         return Columns(packed, (), {}) if packed is not None else self._one_by_one().columns()
 
     def _packed(self) -> dict[str, np.ndarray] | None:
-        """All messages as one array; None where they are not of fixed width."""
+        """All messages read as one array; None where their width is not fixed."""
         fields = self._type.DESCRIPTOR.fields
         kinds = {number: kind for kind in protobuf_rows.KINDS.values()
                  if (number := getattr(_proto(), kind.name)) is not None}  # fmt: skip
@@ -79,7 +78,7 @@ class ProtobufRows:
         for number, data in enumerate(self._data, 1):
             try:
                 message = self._type.FromString(data)
-            except Exception:  # DecodeError of whichever implementation
+            except Exception:  # DecodeError differs between implementations
                 raise UserError(
                     f"{self._path}: message {number} of {self._topic} is no {self._type.DESCRIPTOR.full_name}: "
                     f"{data[:20]!r}"
@@ -89,7 +88,7 @@ class ProtobufRows:
 
 
 def _type(name: str, descriptor: bytes) -> tuple[Any, Any]:
-    """The file that declares a message, None where it is not the first in it, and its class."""
+    """File descriptor that declares a message (None where the message is not its first) and message class."""
     from google.protobuf import descriptor_pool, message_factory
     from google.protobuf.descriptor_pb2 import FileDescriptorSet
 
@@ -99,7 +98,7 @@ def _type(name: str, descriptor: bytes) -> tuple[Any, Any]:
     )
     added: set[str] = set()
 
-    def add(file: Any) -> None:  # those that it imports come first, in whatever order they are given
+    def add(file: Any) -> None:  # imported files must be added first
         if file.name in added:
             return
         added.add(file.name)
@@ -146,7 +145,7 @@ def _plain(message: Any, depth: int) -> Any:
         value = getattr(message, field.name)
         if _repeated(field):
             if isinstance(value, Mapping) or hasattr(value, "keys"):
-                continue  # a map has names that differ from message to message
+                continue  # keys of a map differ between messages
             found[field.name] = [_value(field, item, depth) for item in value]
         elif field.has_presence and not message.HasField(field.name):
             found[field.name] = None

@@ -1,4 +1,4 @@
-"""What a reader makes of a file: columns by the names they have there, and how to speak of a row."""
+"""Table that a reader returns: columns by their names in the file, and names of rows for messages."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -12,21 +12,21 @@ from rtctl.trace.imports.times import is_date, seconds
 
 
 def row_number(row: int) -> str:
-    """How a row (0 is the first) is called where the file has no lines."""
+    """Name of a row (0 is the first) in messages, for a file without lines."""
     return f"row {row}"
 
 
 class Table(NamedTuple):
     path: Path
     columns: dict[str, np.ndarray]  # (n,) each, of any type; n may differ
-    units: dict[str, str]  # where the file names them
-    clock: str = ""  # column that is the time, in s, where nothing else is
+    units: dict[str, str]  # column -> unit, where the file has one
+    clock: str = ""  # column that is the time in s where no other is mapped
     where: Callable[[int], str] = row_number
-    notes: tuple[str, ...] = ()  # sentences for people: what the reader assumed or passed over
-    left: Mapping[str, str] = MappingProxyType({})  # what is in the file and no column -> why
+    notes: tuple[str, ...] = ()  # sentences for the user: assumptions and skipped items
+    left: Mapping[str, str] = MappingProxyType({})  # name in the file that became no column -> reason
 
     def has(self, name: str, use: str) -> np.ndarray:
-        """The column; `use` says what it is wanted for. Raises UserError with the nearest name."""
+        """Column (n,); `use` is its purpose in messages. Raises UserError with the nearest name."""
         if name in self.columns:
             return self.columns[name]
         if name in self.left:
@@ -39,7 +39,7 @@ class Table(NamedTuple):
         raise UserError(f"{self.path} has no column '{name}' (wanted as {use}); {hint}")
 
     def times(self, name: str, factor: float) -> np.ndarray:
-        """The column as times (n,) in s; `factor` is the unit of its numbers in s.
+        """Times (n,) in s of a column; `factor` is the unit of its numbers in s.
 
         Columns keep the type of the file: time stamps (datetime64), durations (timedelta64), integers, doubles.
         Raises UserError that names the first row without a time.
@@ -56,12 +56,12 @@ class Table(NamedTuple):
         return seconds(values, factor)
 
     def empty(self, name: str) -> bool:
-        """Whether a column of numbers holds none: each of its rows is nan."""
+        """Whether all rows of a column of numbers are nan."""
         values = self.columns[name]
         return values.dtype.kind == "f" and bool(np.isnan(values).all())
 
     def numbers(self, name: str, use: str) -> np.ndarray:
-        """The column as doubles (n,), each finite. Raises UserError that names the first row that is not."""
+        """Finite doubles (n,) of a column. Raises UserError with the first row that is not finite."""
         values = self.has(name, use)
         if is_date(values):
             raise UserError(
@@ -86,7 +86,7 @@ class Table(NamedTuple):
 
 
 def is_number(value: Any) -> bool:
-    """Whether a cell is a number or text of one."""
+    """Whether a cell is a number or the text of a number."""
     try:
         float(value)
     except (TypeError, ValueError):

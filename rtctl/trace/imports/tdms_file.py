@@ -1,7 +1,6 @@
-"""NI's TDMS by npTDMS: a column for each channel, with its unit; `group/channel` where there are several groups.
+"""Reader of NI TDMS with npTDMS: a column for each channel, with its unit; `group/channel` with several groups.
 
-Where channels are waveforms, with a start and an increment, and no channel is called `t`, their clock is the column
-`wf_time`.
+Waveform channels have a start and an increment. Without a channel `t`, their clock is the column `wf_time`.
 """
 
 import warnings
@@ -29,7 +28,7 @@ def read(path: Path) -> Table:
                 return _table(path, file)
     except (OSError, UserError):
         raise
-    except Exception:  # whatever a damaged file makes of the reader
+    except Exception:  # npTDMS raises any type for a damaged file
         raise UserError(f"{path} cannot be read as TDMS: it is damaged or of another kind; save it again") from None
 
 
@@ -64,7 +63,7 @@ def _table(path: Path, file: Any) -> Table:
 
 
 def _clock(columns: dict[str, np.ndarray], units: dict[str, str], clocks: dict, notes: list[str]) -> str:
-    """Name of the column that is the time; one for each increment is made where no channel is called t."""
+    """Name of the time column. Without a channel `t`, adds a time column for each increment."""
     if "t" in columns or not clocks:
         return ""
     for (step, start, rows), names in clocks.items():

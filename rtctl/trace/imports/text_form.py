@@ -1,7 +1,7 @@
-"""Form of a text file with a line for each row: what parts the cells, where names and units stand, where rows begin.
+"""Form of a text file with a line for each row: separator, lines of names and units, first row.
 
-The rows decide: separator, number of cells and numeric columns are those of the last lines of the file's head. The
-first line that looks like them is the first row; names and units stand before it, whatever stands before those.
+Separator, number of cells and numeric columns come from the last lines of the file's head. The first line that matches
+them is the first row. The lines of names and units stand above the first row.
 """
 
 import csv
@@ -26,12 +26,12 @@ UNIT_WORDS = {
     "metre": "m", "degree": "deg", "degrees": "deg", "radian": "rad", "newton": "N", "hertz": "Hz",
 }  # fmt: skip
 NO_UNIT = ("", "-", "1", "none", "sequence", "unitless", "dimensionless")
-SAMPLE = 200  # lines of the head from which separator and numeric columns are seen
-MOSTLY = 0.5  # share of the lines, those at the top aside, above which a column with numbers is one of numbers
+SAMPLE = 200  # lines of the head used to detect separator and numeric columns
+MOSTLY = 0.5  # share of numbers in the sampled lines above which a column is numeric
 
 
 class TextPlan(Settings):
-    """What the owner says of a text file; what is absent is seen from the file."""
+    """User's description of a text file; an absent setting is detected from the file."""
 
     separator: str | None = Field(
         default=None, description="between two cells: a sign, `tab`, or `space` for any white space"
@@ -57,7 +57,7 @@ class Form(NamedTuple):
     first: int  # line of the first row, 0 the first of the file
     names: list[str] | None
     units: dict[int, str]  # column -> unit, where a line of units is given
-    passed: int  # lines with something in them, before names and rows, that say nothing here
+    passed: int  # non-blank lines above names and rows that are skipped
 
 
 def cells(line: str, separator: str) -> list[str]:
@@ -72,7 +72,7 @@ def cells(line: str, separator: str) -> list[str]:
 
 
 def is_value(cell: str) -> bool:
-    """Whether a cell holds a number, as somebody writes it, or a date."""
+    """Whether a cell holds a number in any notation, or a date."""
     return bool(NUMBER.fullmatch(cell) or DATE.fullmatch(cell))
 
 
@@ -87,7 +87,7 @@ def form_of(path: object, lines: list[str], plan: TextPlan) -> Form:
     if not full:
         raise UserError(f"{path} holds no line of names or numbers")
     body = [k for k in full if not is_comment(lines[k])][-SAMPLE:] or full[-1:]
-    body = body[len(body) // 2 :]  # what stands before the rows is no measure
+    body = body[len(body) // 2 :]  # the first half may hold lines that are no rows
     separator = separator or _separator([lines[k] for k in body])
     rows = [cells(lines[k], separator) for k in body]
     width = _usual([len(row) for row in rows], [len(cells(lines[k], separator)) for k in full])
@@ -98,7 +98,7 @@ def form_of(path: object, lines: list[str], plan: TextPlan) -> Form:
         raise UserError(f"{path}: there is no line {plan.names_line} for the names; the file has {len(lines)} lines")
     after = max(names_line if names_line is not None else -1, (plan.units_line or 0) - 1)
     first = _first_row(lines, full, separator, width, numeric, after)
-    ended = all(not row[-1] for row in rows)  # a separator stands at the end of each row
+    ended = all(not row[-1] for row in rows)  # each row ends in a separator
     names, units, used = _names(lines, [k for k in full if k < first], separator, width, ended, names_line, plan)
     if names is None and plan.names_line is None:
         _refuse_other_names(path, lines, first, separator, width)
@@ -107,7 +107,7 @@ def form_of(path: object, lines: list[str], plan: TextPlan) -> Form:
 
 
 def _refuse_other_names(path: object, lines: list[str], first: int, separator: str, width: int) -> None:
-    """Raise UserError where the line above the first row has names, and another number of them than rows have cells."""
+    """Raise UserError where the line above the first row has names, but not one for each cell."""
     found = cells(lines[first - 1], separator) if 0 < first < len(lines) and not is_comment(lines[first - 1]) else []
     if len(found) > 1 and all(cell and not is_value(cell) and unit_of(cell) is None for cell in found):
         signs = "; is a comma both decimal sign and separator?" if separator == "," and width % len(found) == 0 else ""
@@ -118,7 +118,7 @@ def _refuse_other_names(path: object, lines: list[str], first: int, separator: s
 
 
 def _separator(lines: list[str]) -> str:
-    """The separator by which most lines have equally many cells, and most of these hold numbers."""
+    """Separator that gives most lines the same number of cells, and most of these cells numbers."""
     best, chosen = (-1.0, -1.0), ","
     for separator in SEPARATORS:
         rows = [cells(line, separator) for line in lines]
@@ -135,12 +135,12 @@ def _separator(lines: list[str]) -> str:
 
 
 def _usual(widths: list[int], others: Sequence[int] = ()) -> int:
-    """The commonest width; of two alike the one that is commoner among the others."""
+    """Most frequent width; ties are decided by the frequency in `others`."""
     return max(set(widths), key=lambda width: (widths.count(width), others.count(width), width))
 
 
 def is_comment(line: str) -> bool:
-    """Whether a line says nothing but what a person reads."""
+    """Whether a line is a comment."""
     return line.lstrip("\ufeff \t").startswith(COMMENTS)
 
 
@@ -152,13 +152,13 @@ def _first_row(lines: list[str], full: list[int], separator: str, width: int, nu
         filled = all(is_value(row[n]) or not row[n] for n in numeric) and any(row[n] for n in numeric)
         if filled or (not numeric and k > full[0]):
             return k
-    return len(lines)  # names and nothing below them
+    return len(lines)  # names without rows
 
 
 def _names(
     lines: list[str], before: list[int], separator: str, width: int, ended: bool, names_line: int | None, plan: TextPlan
 ) -> tuple[list[str] | None, dict[int, str], set[int]]:
-    """Names, units by column, and the lines that they stand in."""
+    """Names, units by column, and the line numbers of both."""
     if plan.names_line == 0:
         return None, {}, set()
     fitting = [k for k in before if len(_heading(lines[k], separator, width, ended)) == width]
@@ -175,7 +175,9 @@ def _names(
         used.add(units_line)
     if names_line is None:
         left = [k for k in fitting if k not in used]
-        left = [k for k in left if not is_comment(lines[k])] or left  # else the last comment that has as many cells
+        left = [
+            k for k in left if not is_comment(lines[k])
+        ] or left  # without another line, the last comment with as many cells
         names_line = left[-1] if left else None
     if names_line is None:
         return None, units, used
@@ -184,7 +186,7 @@ def _names(
 
 
 def _heading(line: str, separator: str, width: int, ended: bool) -> list[str]:
-    """Cells of a line of names, without the mark of a comment; an empty one at the end is added or left out."""
+    """Cells of a line of names without comment sign; an empty cell at the end is added or removed to fit."""
     line = line.lstrip("\ufeff")
     bare = line.lstrip()
     if mark := next((mark for mark in COMMENTS if bare.startswith(mark)), ""):
@@ -198,7 +200,7 @@ def _heading(line: str, separator: str, width: int, ended: bool) -> list[str]:
 
 
 def unit_of(cell: str) -> str | None:
-    """Unit that a cell of a line of units holds: `(ms)`, `[V]`, `mm`, `second`; "": none; None: it is no unit."""
+    """Unit in a cell of a line of units: `(ms)`, `[V]`, `mm`, `second`; "" for no unit; None for other text."""
     bare = cell.strip().strip("()[]").strip()
     if bare.casefold() in NO_UNIT:
         return ""

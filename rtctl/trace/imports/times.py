@@ -2,7 +2,7 @@
 
 import numpy as np
 
-SPACING = 1e-4  # of a step: coarsest spacing of doubles at which a clock keeps its own zero
+SPACING = 1e-4  # share of a step: coarsest spacing of doubles at which a clock keeps its zero
 
 
 def is_date(values: np.ndarray) -> bool:
@@ -14,7 +14,7 @@ def seconds(values: np.ndarray, factor: float) -> np.ndarray:
     """Times (n,) in s as doubles.
 
     `values` (n,) are datetime64 or timedelta64 without NaT, or finite numbers in units of `factor` s. Time stamps are
-    counted from the first row. Integers keep their zero unless doubles are too coarse for their steps there.
+    counted from the first row. Integers keep their zero unless doubles would be too coarse for their steps.
     """
     if not len(values):
         return np.empty(0)
@@ -22,7 +22,7 @@ def seconds(values: np.ndarray, factor: float) -> np.ndarray:
         ticks = values - values[0]
         one = np.array(1, ticks.dtype)
         per_second = float(np.timedelta64(1, "s") / one)
-        whole = ticks.astype(np.int64)  # divided where it can be: 15e9 ns are 15 s, 15e9 * 1e-9 s are not
+        whole = ticks.astype(np.int64)  # division is exact: 15e9 ns / 1e9 are 15 s, 15e9 * 1e-9 s are not
         return whole / per_second if per_second >= 1.0 else whole * float(one / np.timedelta64(1, "s"))
     if values.dtype.kind in "iu" and len(values) > 1:
         first = values[0]
