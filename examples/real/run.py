@@ -25,6 +25,7 @@ IMAGES = ROOT / "docs" / "images" / "real"
 DIGITS = 3
 PAGE = ROOT / "docs" / "proof.md"
 NUMBER = re.compile(r"The machine acts as if (.*?) instead of")  # a description value far outside its tolerance
+VERDICTS = ("named", "ambiguous", "unnamed", "nothing")
 BEGIN, END = "<!-- found: begin -->", "<!-- found: end -->"
 
 
@@ -86,13 +87,13 @@ def rounded(value: float | None) -> float | None:
 
 
 def table() -> str:
-    """Markdown table with a row for each finished case, in the order of cases.yaml."""
-    lines = ["| case | known from elsewhere | found | held-out before, after |", "|---|---|---|---|"]
-    for name, case in cases().items():
-        file = FOUND / f"{name}.json"
-        if file.exists():
-            lines.append(row(name, case, json.loads(file.read_text())))
-    return "\n".join(lines)
+    """Markdown table with a row for each finished case, by verdict, then in the order of cases.yaml."""
+    lines = ["| case | expected (owner, literature) | found | held-out before, after |", "|---|---|---|---|"]
+    there = [(name, case, FOUND / f"{name}.json") for name, case in cases().items()]
+    finished = [(name, case, json.loads(file.read_text())) for name, case, file in there if file.exists()]
+    return "\n".join(
+        lines + [row(*each) for each in sorted(finished, key=lambda each: VERDICTS.index(each[2]["verdict"]))]
+    )
 
 
 def page(text: str) -> str:
@@ -114,7 +115,7 @@ def row(name: str, case: dict[str, Any], found: dict[str, Any]) -> str:
     if number is not None:
         names.insert(0, f"as if {number[1]}")
     elif found["verdict"] == "unnamed" and at:
-        names.insert(0, f"a force or error at {at['node']} by {at['axis']}")
+        names.insert(0, f"an unexplained force or error at {at['node']} that depends on {at['axis']}")
     verdict = f"`{found['verdict']}`{': ' if names else ''}{'; '.join(names)}"
     before, after = (f"{100 * x:.2g} %" for x in found["heldout"])
     return f"| {name} | {case['known']} | {verdict} | {before}, {after} |"
