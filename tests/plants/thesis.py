@@ -6,7 +6,7 @@ import numpy as np
 
 
 def accelerations(p: Any, q: np.ndarray, v: np.ndarray, torque: np.ndarray) -> np.ndarray:
-    """Accelerations (5,) of the two-reel unit (4.9)-(4.17): motor 1, reel 1, capstan, reel 2, motor 2; `torque` (5,), Nm."""
+    """Accelerations (5,) by (4.9)-(4.17): motor 1, reel 1, capstan, reel 2, motor 2; `torque` (5,), Nm."""
     grow = p.d_tape / (2 * np.pi)
     R1, R2 = p.R1 + grow * q[1], p.R2 + grow * q[3]
     J1 = p.J_1 + 0.5 * np.pi * p.rho_h * (R1**4 - p.R1**4)
