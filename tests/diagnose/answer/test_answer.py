@@ -13,7 +13,7 @@ def test_nominal_machine_has_the_verdict_nothing():
     assert d.headline.startswith("Nothing is missing")
     assert d.heldout.before < 2 * d.heldout.floor
     for path, v in d.parameters.items():
-        nominal = 0.0 if path == START else d.record.case.values[path]  # stored as a logarithm
+        nominal = 0.0 if path == START else d.record.case.values[path]  # the case stores its exponential
         assert v.low <= nominal <= v.high, path
 
 
