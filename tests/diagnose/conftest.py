@@ -1,4 +1,4 @@
-"""What tests of the diagnosis share: recordings of an axis, made by the simulator itself and cut into its steps."""
+"""Shared fixtures of the diagnosis: recordings of an axis, simulated and quantised."""
 
 from collections.abc import Callable
 from functools import lru_cache
@@ -16,7 +16,7 @@ from rtctl.diagnose.record.format1 import Record, check
 from rtctl.plants.physics import TERMS
 
 SHARED = Path(__file__).parents[3] / "shared"
-STEP = 2e-6  # m, of the encoder
+STEP = 2e-6  # m, encoder resolution
 RATE, SECONDS = 1000.0, 8.0
 CASE: dict[str, Any] = {
     "format": 1,
@@ -57,25 +57,25 @@ CASES = {"axis": CASE, "ivu": IVU_CASE, "ldu": LDU_CASE}
 
 
 def command(n: int) -> np.ndarray:
-    """Reference (n,) m: two slow sines, so that every speed and place is passed both ways, and stops at both ends.
+    """Reference (n,) in m: two slow sines with stops at both ends.
 
-    Without the stops friction that has a direction would be the same as a constant push.
+    Every speed and position occurs in both directions; the stops separate asymmetric friction from a constant force.
     """
     t = np.arange(n) / RATE
     return np.clip(0.05 * (1 - np.cos(2 * np.pi * 0.4 * t)) + 0.01 * np.sin(2 * np.pi * 1.3 * t), 0.01, 0.09) - 0.01
 
 
 class Axis(NamedTuple):
-    """A recording of the axis, and the model that it was made with."""
+    """Recording of the axis and its true model."""
 
     record: Record
     model: Model
 
 
 def record_axis(*physics: dict[str, Any], seconds: float = SECONDS, step: float = STEP, **true: float) -> Axis:
-    """What the axis with `physics` in it does; `true` parameters differ from the owner's.
+    """Recording of the axis with the terms `physics`; `true` parameters differ from the nominal values.
 
-    The law saw the reading before it was cut, so that the recorded command is taken as the input.
+    The law used the unquantised reading, so the recorded command is the input.
     """
     case, n = read_case(CASE, "."), round(RATE * seconds)
     model = owner_model(case).change(**true).add(*(TERMS[p["term"]].settings(**p) for p in physics))
@@ -87,7 +87,7 @@ def record_axis(*physics: dict[str, Any], seconds: float = SECONDS, step: float 
 
 @pytest.fixture(scope="session")
 def blank() -> Callable[..., Record]:
-    """`blank("ivu", u, y)` is a record of any plant with volts u (n, drives) and its main sensor's readings y (n,)."""
+    """`blank("ivu", u, y)`: record of a plant with volts u (n, drives) and readings y (n,) of the main sensor."""
 
     def make(plant: str, u: np.ndarray, y: np.ndarray | None = None, **changes: Any) -> Record:
         case = read_case({**CASES[plant], **changes}, ".")
@@ -101,14 +101,14 @@ def blank() -> Callable[..., Record]:
 
 @pytest.fixture(scope="session", autouse=True)
 def one_thread():
-    """Small matrices: threads of the linear algebra would only stand in each other's way."""
+    """One thread of linear algebra: more threads slow down small matrices."""
     with threadpool_limits(1):
         yield
 
 
 @pytest.fixture(scope="session")
 def make_axis() -> Callable[..., Axis]:
-    """`make_axis({"term": ...}, M=100.0)` is a recording with these terms and parameters, made once."""
+    """`make_axis({"term": ...}, M=100.0)`: recording with these terms and parameters, cached."""
 
     @lru_cache
     def made(physics: tuple, options: tuple) -> Axis:
@@ -122,13 +122,13 @@ def make_axis() -> Callable[..., Axis]:
 
 @pytest.fixture(scope="session")
 def plain(make_axis: Callable[..., Axis]) -> Axis:
-    """An axis with nothing in it beyond the owner's equations, whose numbers the owner has wrong."""
+    """Axis without extra terms; the nominal values of the owner are wrong."""
     return make_axis(M=100.0, F_v=180.0, F_c=22.0)
 
 
 @pytest.fixture(scope="session")
 def practice() -> Path:
-    """Folder of the practice bundles, which lies beside the project where it is there at all."""
+    """Folder of the practice bundles beside the project; without the folder the test is skipped."""
     folder = SHARED / "blind" / "practice"
     if not folder.is_dir():
         pytest.skip(f"{folder} is not here")
@@ -137,7 +137,7 @@ def practice() -> Path:
 
 @pytest.fixture(scope="session")
 def real_data() -> Path:
-    """Folder of recordings of real machines, beside the project."""
+    """Folder of recordings of real machines beside the project; without the folder the test is skipped."""
     folder = SHARED / "data"
     if not folder.is_dir():
         pytest.skip(f"{folder} is not here")

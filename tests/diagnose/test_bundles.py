@@ -14,7 +14,7 @@ from rtctl.diagnose.folder import Task, one
 
 @pytest.fixture(scope="module")
 def bench(tmp_path_factory):
-    """A bundle of a pendulum that is as described, and its second recording."""
+    """Bundle of a nominal pendulum, with a held-out recording."""
     folder = tmp_path_factory.mktemp("benches")
     for name, seed in (("swing", 1), ("swing-heldout", 2)):
         u = command(4.0, seed=seed)
@@ -22,7 +22,7 @@ def bench(tmp_path_factory):
     return folder / "swing"
 
 
-def test_files(bench, tmp_path):
+def test_diagnosis_writes_its_files(bench, tmp_path):
     made = diagnose_into(bench, None, tmp_path / "out")
     assert made.data["verdict"] == "nothing"
     assert not made.faults
@@ -30,9 +30,9 @@ def test_files(bench, tmp_path):
     assert json.loads((tmp_path / "out" / "diagnosis.json").read_text()) == made.data
 
 
-def test_second_recording(bench, tmp_path):
+def test_second_recording_is_the_held_out_data(bench, tmp_path):
     made = diagnose_into(bench, bench.parent / "swing-heldout", tmp_path / "out", report=False)
-    assert made.diagnosis.heldout.rows[1] == 2000  # all rows of the second
+    assert made.diagnosis.heldout.rows[1] == 2000  # all rows of the second recording
     assert made.data["fit"]["heldout_nrmse_before"] < 2e-4
     case = json.loads((bench / "case.json").read_text())
     case["machine"]["bodies"]["other"] = {"inertia": 1.0}
@@ -43,7 +43,7 @@ def test_second_recording(bench, tmp_path):
         predicted(made.diagnosis, tmp_path / "else")
 
 
-def test_a_bad_case_in_a_folder(bench, tmp_path):
+def test_invalid_case_in_a_folder_is_reported(bench, tmp_path):
     shutil.copytree(bench, tmp_path / "bad")
     (tmp_path / "bad" / "case.json").write_text('{"format": 2, "machine": {"bodies": {}}}')
     outcome = one(Task("bad", tmp_path / "bad", tmp_path / "out"), report=False)
@@ -51,7 +51,7 @@ def test_a_bad_case_in_a_folder(bench, tmp_path):
     assert "machine" in outcome.message
 
 
-def test_command_line(bench, tmp_path):
+def test_command_line_prints_json_or_text(bench, tmp_path):
     out = tmp_path / "out"
     done = CliRunner().invoke(app, ["diagnose", str(bench), "--out", str(out), "--no-report", "--json"])
     assert done.exit_code == 0, done.output
@@ -72,7 +72,7 @@ def test_command_line(bench, tmp_path):
         (("leg", ""), False, "group is missing"),
     ],
 )
-def test_several_recordings_are_one_machine_by_group_or_flag(tmp_path, groups, together, sentence):
+def test_recordings_of_one_machine_need_a_group_or_a_flag(tmp_path, groups, together, sentence):
     bundles = []
     for i, group in enumerate(groups):
         folder = tmp_path / str(i)

@@ -18,11 +18,11 @@ def config(request):
     return load_settings(find(request.param), machines.CONFIGS[request.param])
 
 
-def test_the_same_seed_hides_the_same(config):
+def test_concealed_effect_depends_only_on_the_seed(config):
     assert [conceal(config, seed)[1] for seed in range(20)] == [conceal(config, seed)[1] for seed in range(20)]
 
 
-def test_what_is_drawn_is_valid_for_every_seed(config):
+def test_concealed_effect_is_valid_for_every_seed(config):
     drawn = set()
     for seed in SEEDS:
         hidden, entry = conceal(config, seed)
@@ -35,8 +35,8 @@ def test_what_is_drawn_is_valid_for_every_seed(config):
     assert len(drawn) > 20
 
 
-def test_every_effect_can_be_hidden_at_every_node_that_it_has(config):
-    """No draw is thrown away for its bounds, whatever the luck."""
+def test_every_effect_can_be_concealed_at_each_of_its_nodes(config):
+    """Every draw is within the bounds of its settings."""
     rng = np.random.default_rng(1)
     for name in TERMS:
         for node in nodes(name, config):
@@ -45,11 +45,11 @@ def test_every_effect_can_be_hidden_at_every_node_that_it_has(config):
                 machines.build(set_path(config, f"plant.physics.{len(config.plant.physics)}", entry))
 
 
-def test_a_loop_keeps_the_sign_of_its_sensor(config):
+def test_feedback_sensor_is_never_rectified(config):
     assert not set(nodes("sensor.rectified", config)) & set(having(config.machine, "sensor", "feedback"))
 
 
-def test_what_the_machine_believes_already_stays(config):
+def test_known_effects_of_the_config_remain(config):
     node = {"ivu": "drive1"}.get(config.machine, "drive")
     known = set_path(config, "plant.physics", [{"term": "drive.offset", "node": node, "offset": 0.1}])
     hidden, _ = conceal(known, 3)
@@ -57,7 +57,7 @@ def test_what_the_machine_believes_already_stays(config):
     assert len(hidden.plant.physics) == 2
 
 
-def test_sizes_follow_the_machine():
+def test_concealed_size_scales_with_the_machine():
     light = load_settings(find("axis"), machines.CONFIGS["axis"], ["plant.parameters.F_c=2", "plant.parameters.M=9"])
     heavy = load_settings(find("axis"), machines.CONFIGS["axis"], ["plant.parameters.F_c=20", "plant.parameters.M=90"])
     sizes = [
@@ -66,7 +66,7 @@ def test_sizes_follow_the_machine():
     assert sizes[1] == pytest.approx(10 * sizes[0], rel=1e-2)
 
 
-def test_the_tables_speak_of_what_there_is(config):
+def test_draw_tables_use_existing_parameters_and_measures(config):
     for term in TERMS.values():
         assert set(term.draws) | set(term.chosen) <= set(term.settings.model_fields)
         for span in term.draws.values():

@@ -1,4 +1,4 @@
-"""Diagnoses on disk, and many of them side by side."""
+"""Diagnoses of a folder in parallel processes, and their results on disk."""
 
 import json
 import os
@@ -48,7 +48,7 @@ if __name__ == "__main__":
 
 @pytest.fixture
 def work(tmp_path, monkeypatch):
-    """Something quick to do in other processes, which find it by its name."""
+    """A quick task that other processes import by name."""
     (tmp_path / "quick_work.py").write_text(WORK)
     monkeypatch.syspath_prepend(tmp_path)
     import quick_work
@@ -67,7 +67,7 @@ def bundle(path, rows=10):
     return path
 
 
-def test_what_dies_does_not_stop_the_others(work):
+def test_dead_process_does_not_stop_the_others(work):
     names = ("a", "dies", "b", "c")
     outcomes = {o.name: o for o in diagnose_all(named(*names), jobs=2, work=work)}
     assert outcomes.keys() == set(names)
@@ -77,13 +77,13 @@ def test_what_dies_does_not_stop_the_others(work):
     assert outcomes["a"].diagnosis["blas"] == "1"
 
 
-def test_what_gets_stuck_is_ended_and_the_next_begins(work):
+def test_stuck_process_is_ended_and_the_next_task_begins(work):
     outcomes = list(diagnose_all(named("stuck", "stuck"), limit=0.2, work=work))
     assert [o.code for o in outcomes] == [OURS, OURS]
     assert "not done within --limit 0.2 s" in outcomes[1].message
 
 
-def test_one_process_has_the_cores_to_itself(work, monkeypatch):
+def test_single_job_keeps_all_threads_and_one_process(work, monkeypatch):
     from rtctl.diagnose.likelihood.solver import THREADS
 
     monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
@@ -94,7 +94,7 @@ def test_one_process_has_the_cores_to_itself(work, monkeypatch):
     assert "OPENBLAS_NUM_THREADS" not in os.environ
 
 
-def test_leaving_early_ends_the_processes(work):
+def test_closing_the_iterator_ends_the_processes(work):
     running = diagnose_all(named("a", "stuck"), jobs=2, work=work)
     pid = next(running).diagnosis["pid"]
     running.close()
@@ -102,7 +102,7 @@ def test_leaving_early_ends_the_processes(work):
         os.kill(pid, 0)
 
 
-def test_killing_ends_the_processes(work, tmp_path):
+def test_killing_the_parent_ends_the_processes(work, tmp_path):
     script = tmp_path / "script.py"
     script.write_text(SCRIPT)
     with subprocess.Popen([sys.executable, script], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as main:
@@ -113,11 +113,11 @@ def test_killing_ends_the_processes(work, tmp_path):
         assert main.stderr.read() == b""
 
 
-def test_nothing_to_do():
+def test_empty_task_list_gives_no_outcomes():
     assert list(diagnose_all([])) == []
 
 
-def test_bundles_are_found_by_name(tmp_path):
+def test_tasks_are_sorted_and_paired_with_held_out_bundles(tmp_path):
     for name in ("b", "a", "a-heldout", "lonely-heldout"):
         bundle(tmp_path / name)
     (tmp_path / "notes").mkdir()
@@ -127,20 +127,20 @@ def test_bundles_are_found_by_name(tmp_path):
     assert [t.other for t in found] == [tmp_path / "a-heldout", None, None]
 
 
-def test_results_and_second_recordings_elsewhere(tmp_path):
+def test_tasks_with_separate_result_and_held_out_folders(tmp_path):
     bundle(tmp_path / "x" / "a")
     found = tasks(tmp_path / "x", tmp_path / "out", tmp_path / "later")
     assert found == [Task("a", tmp_path / "x" / "a", tmp_path / "out" / "a", tmp_path / "later" / "a")]
 
 
-def test_a_bundle_is_no_folder_of_bundles(tmp_path):
+def test_bundle_is_not_a_folder_of_bundles(tmp_path):
     bundle(tmp_path / "a")
     bundle(tmp_path / "a" / "inner")
     assert tasks(tmp_path / "a") == []
     assert tasks(tmp_path / "nowhere") == []
 
 
-def test_done_as_long_as_nothing_is_newer(tmp_path):
+def test_result_is_valid_while_no_input_is_newer(tmp_path):
     task = Task("a", bundle(tmp_path / "a"), tmp_path / "out")
     assert done(task) is None
     task.out.mkdir()
@@ -153,14 +153,14 @@ def test_done_as_long_as_nothing_is_newer(tmp_path):
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]", "{}", '{"seconds": null}'])
-def test_half_a_result_is_none(tmp_path, text):
+def test_incomplete_result_file_is_ignored(tmp_path, text):
     task = Task("a", bundle(tmp_path / "a"), tmp_path)
     (tmp_path / RESULT).write_text(text)
     os.utime(tmp_path / RESULT, ns=(2**61, 2**61))
     assert done(task) is None
 
 
-def test_a_bad_bundle_is_told_in_one_line(tmp_path):
+def test_invalid_bundle_is_reported_in_one_line(tmp_path):
     outcome = one(Task("a", bundle(tmp_path / "a"), tmp_path / "out"), report=False)
     assert outcome.code == BAD
     assert "no column 'u'" in outcome.message and "\n" not in outcome.message
@@ -168,7 +168,7 @@ def test_a_bad_bundle_is_told_in_one_line(tmp_path):
     assert not (tmp_path / "out").exists()
 
 
-def test_our_own_fault_is_told_as_ours(tmp_path, monkeypatch):
+def test_internal_error_is_reported_as_internal(tmp_path, monkeypatch):
     from rtctl.diagnose.answer import answer
 
     def broken(*_, **__):

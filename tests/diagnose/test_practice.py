@@ -1,6 +1,6 @@
-"""Practice bundles with known answers, which lie beside the project where they are there at all.
+"""Practice bundles with known answers, beside the project.
 
-RTCTL_PROOF=full diagnoses all of them; otherwise three, cut short.
+RTCTL_PROOF=full diagnoses all of them; the default is three shortened bundles.
 """
 
 import json
@@ -23,7 +23,7 @@ VISIBLE = 0.3  # times the noise floor
 
 
 def first(bundle: Path, seconds: float) -> GraphRecord:
-    """The beginning of a recording."""
+    """First `seconds` of a recording."""
     record = load_record(bundle)
     rows = slice(0, round(seconds / record.dt))
     arrays = {name: getattr(record, name)[rows] for name in ("t", "ref", "w", "u")}
@@ -32,7 +32,7 @@ def first(bundle: Path, seconds: float) -> GraphRecord:
 
 
 def written(d: GraphDiagnosis) -> dict[str, Any]:
-    """As it comes back from diagnosis.json."""
+    """Diagnosis as read from diagnosis.json."""
     return dict(json.loads(json.dumps(finite(d.as_json()))))
 
 
@@ -43,7 +43,7 @@ def answers(practice: Path) -> dict[str, Any]:
 
 @pytest.mark.skipif(FULL, reason="all of them are diagnosed")
 @pytest.mark.parametrize("case", LENGTHS)
-def test_a_few_are_told_as_they_are(practice, answers, case):
+def test_shortened_practice_bundles_are_diagnosed_correctly(practice, answers, case):
     found = written(diagnose_record(first(practice / case, LENGTHS[case])))
     result = score({case: answers[case]}, {case: found}, VISIBLE)
     assert result["missing"] == 0
@@ -52,8 +52,8 @@ def test_a_few_are_told_as_they_are(practice, answers, case):
 
 @pytest.mark.skipif(not FULL, reason="takes half an hour; RTCTL_PROOF=full runs it")
 @pytest.mark.timeout(7200)
-def test_all_practice_bundles_hold(practice, answers, record_property):
-    """No false alarm, and nine in ten visible singles named or among the names of an ambiguous verdict."""
+def test_all_practice_bundles_reach_the_required_score(practice, answers, record_property):
+    """No false alarm; 90 % of the visible single effects are named, alone or in an ambiguous verdict."""
     all_of_them = {case: written(diagnose(practice / case)) for case in sorted(answers)}
     result = score(answers, all_of_them, VISIBLE)
     record_property("score", json.dumps(result))
@@ -66,5 +66,5 @@ def test_all_practice_bundles_hold(practice, answers, record_property):
 
 
 def named(d: dict[str, Any]) -> list[str]:
-    """Names that a diagnosis gives."""
+    """Effect names of a named or ambiguous diagnosis."""
     return [e["name"] for e in d["effects"]] if d["verdict"] in ("named", "ambiguous") else []

@@ -1,4 +1,4 @@
-"""Recordings of real machines, which lie beside the project where they are there at all.
+"""Recordings of real machines, beside the project.
 
 Source: Janot, Gautier & Brunot, Data set and reference models of EMPS (2019); Wigren & Schoukens, Three free data sets
 for development and benchmarking in nonlinear system identification, ECC 2013; github.com/gchenfc/ODrive,
@@ -18,7 +18,7 @@ def motors(real_data):
     return [load_record(real_data / f"bldc_slow_{k}") for k in range(3)]
 
 
-def test_three_recordings_of_a_motor_give_one_torque_over_the_turn(motors):
+def test_three_recordings_of_a_motor_give_equal_torque_ripple_maps(motors):
     turns = [over_turn(record, owner_model(record.case, record)) for record in motors]
     for found in turns:
         assert found.orders[0].order == 7.0

@@ -1,4 +1,4 @@
-"""One machine with three effects in one compiled structure: each test has other sizes of them."""
+"""A belt axis with three effects in one compiled structure; each test sets its sizes."""
 
 from typing import Any
 
@@ -24,6 +24,6 @@ def belt() -> Any:
 
 @pytest.fixture(scope="session")
 def with_sizes():
-    """The belt axis with effects of these sizes; those that are not named do nothing."""
+    """Function (sizes of effects) -> config of the belt axis; effects without a given size have size 0."""
     base = set_paths(belt(), {"plant.physics": [dict(effect) for effect in EFFECTS]})
     return lambda **sizes: set_paths(base, {SIZES[name.replace("_", " ")]: value for name, value in sizes.items()})

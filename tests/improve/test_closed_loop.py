@@ -1,4 +1,4 @@
-"""Runs on the machine that runs: their order, what is learned from which, and the config that is kept."""
+"""Runs on the running machine: their order, the learning updates and the kept config."""
 
 from pathlib import Path
 from types import SimpleNamespace
@@ -16,7 +16,7 @@ def figures(rms, tripped=""):
 
 @pytest.fixture
 def machine(with_sizes, monkeypatch):
-    """A machine whose error is the share of a force that the learned values do not give; it trips where told."""
+    """A machine whose error is the force minus the learned values; it trips in the runs named in `trips`."""
     played, trips = [], set()
 
     def read(config, bundle, tripped):
@@ -43,7 +43,7 @@ def machine(with_sizes, monkeypatch):
     return SimpleNamespace(result=result, owner=owner, run=run, played=played, trips=trips)
 
 
-def test_a_move_is_learned_run_by_run(machine, tmp_path):
+def test_learning_reduces_the_error_over_successive_runs(machine, tmp_path):
     proof = closed_loop.prove(machine.result, machine.owner, tmp_path, 3, run=machine.run)
     assert proof.names == ("before", "improved", "learned-1", "learned-2", "learned-3")
     rms = [f.rms for f in proof.figures]
@@ -52,12 +52,12 @@ def test_a_move_is_learned_run_by_run(machine, tmp_path):
     assert proof.config.law.compensation.learning is not None
 
 
-def test_the_machine_keeps_its_own_name_link_and_board(machine, tmp_path):
+def test_runs_keep_the_name_of_the_configured_machine(machine, tmp_path):
     closed_loop.prove(machine.result, machine.owner, tmp_path, 0, run=machine.run)
     assert [config.name for config in machine.played] == ["bench", "bench"]
 
 
-def test_a_trip_ends_the_learning(machine, tmp_path):
+def test_trip_stops_the_learning(machine, tmp_path):
     machine.trips.add("learned-1")
     proof = closed_loop.prove(machine.result, machine.owner, tmp_path, 4, run=machine.run)
     assert proof.names == ("before", "improved", "learned-1")

@@ -1,4 +1,4 @@
-"""Inverse of the drive's curve."""
+"""Inverse of the static drive characteristic."""
 
 import numpy as np
 import pytest
@@ -9,8 +9,8 @@ from rtctl.improve.lines import swept
 from rtctl.laws import inverse_curve
 
 
-def through(config, wanted):
-    """What the drive gives where the inverse is asked for `wanted` V."""
+def output_behind_inverse(config, wanted):
+    """Output of the drive (V) behind its inverse curve, for the requested output `wanted` (V)."""
     points = curve.inverse(found.of_config(config, "a test"))
     p = inverse_curve.build(inverse_curve.InverseCurveSettings(points=points), 0.001)
     asked = np.array([inverse_curve.step(p, value) for value in wanted])
@@ -22,29 +22,29 @@ def through(config, wanted):
     {"term": "drive.offset", "offset": 0.7},
     {"term": "drive.gain_asymmetry", "a": 0.2},
 ])  # fmt: skip
-def test_the_drive_gives_what_is_wanted(entry, with_sizes):
+def test_inverse_curve_linearises_the_drive(entry, with_sizes):
     config = set_paths(with_sizes(), {"plant.physics": [{**entry, "node": "amplifier"}]})
     wanted = np.concatenate([np.linspace(-7.0, -0.2, 30), np.linspace(0.2, 7.0, 30)])
-    assert np.abs(through(config, wanted) - wanted).max() < 0.06
+    assert np.abs(output_behind_inverse(config, wanted) - wanted).max() < 0.06
 
 
-def test_effects_of_a_drive_are_turned_round_together(with_sizes):
+def test_inverse_curve_covers_all_effects_of_a_drive(with_sizes):
     entries = [
         {"term": "drive.offset", "node": "amplifier", "offset": 0.4},
         {"term": "drive.deadband", "node": "amplifier", "band": 0.5},
     ]
     config = set_paths(with_sizes(), {"plant.physics": entries})
     wanted = np.linspace(1.0, 6.0, 20)
-    assert np.abs(through(config, wanted) - wanted).max() < 0.06
+    assert np.abs(output_behind_inverse(config, wanted) - wanted).max() < 0.06
 
 
-def test_a_dead_band_is_crossed_with_a_bounded_slope(with_sizes):
+def test_inverse_of_a_dead_band_has_a_bounded_slope(with_sizes):
     points = np.array(curve.inverse(found.of_config(with_sizes(dead_band=0.5), "a test")))
     slope = np.diff(points[:, 1]) / np.diff(points[:, 0])
     assert slope.max() <= 1.05 * curve.STEEP
     assert np.all(np.diff(points, axis=0) > 0)
 
 
-def test_without_a_curve_there_is_none(with_sizes):
+def test_drive_without_static_effect_has_no_inverse_curve(with_sizes):
     config = set_paths(with_sizes(), {"plant.physics": [{"term": "friction.coulomb", "node": "motor", "F_C": 1e-3}]})
     assert curve.inverse(found.of_config(config, "a test")) is None

@@ -1,4 +1,4 @@
-"""Models and diagnoses as an improvement reads them."""
+"""Models and diagnoses as inputs of an improvement."""
 
 import json
 
@@ -10,7 +10,7 @@ from rtctl.diagnose.evidence.diagnosis import Interval
 from rtctl.improve import found
 
 
-def test_a_model_is_read_with_its_effects(with_sizes, tmp_path):
+def test_model_file_gives_its_effects(with_sizes, tmp_path):
     (tmp_path / "any.yaml").write_text(to_yaml(with_sizes(dry=3.0)))
     read = found.load(tmp_path / "any.yaml", None, None)
     assert [effect.entry.term for effect in read.effects] == ["drive.deadband", "friction.coulomb", "load.spring"]
@@ -19,7 +19,7 @@ def test_a_model_is_read_with_its_effects(with_sizes, tmp_path):
     assert not read.unnamed
 
 
-def test_a_diagnosis_gives_the_intervals(with_sizes, tmp_path):
+def test_diagnosis_gives_the_intervals_of_the_effects(with_sizes, tmp_path):
     folder = tmp_path / "bundle" / "diagnosis"
     folder.mkdir(parents=True)
     (folder / "model.yaml").write_text(to_yaml(with_sizes(dry=3.0)))
@@ -35,7 +35,7 @@ def test_a_diagnosis_gives_the_intervals(with_sizes, tmp_path):
         assert effect.interval == "F_C 3, 90 % 2.5 to 3.2 N"
 
 
-def test_the_law_of_another_config_is_taken(with_sizes, tmp_path):
+def test_law_comes_from_the_given_config(with_sizes, tmp_path):
     (tmp_path / "model.yaml").write_text(to_yaml(with_sizes(dry=3.0)))
     read = found.load(tmp_path / "model.yaml", "configs/machines/belt.yaml", None)
     assert read.config.law.position.gain == 4.55 and len(read.effects) == 3
@@ -46,7 +46,7 @@ def test_the_law_of_another_config_is_taken(with_sizes, tmp_path):
 @pytest.mark.parametrize(("name", "match"), [
     ("nowhere", "no such file or folder"), ("empty", r"no model\.yaml in it; `rtctl diagnose"),
 ])  # fmt: skip
-def test_what_is_no_model_is_told(name, match, tmp_path):
+def test_path_without_a_model_is_refused(name, match, tmp_path):
     (tmp_path / "empty").mkdir()
     with pytest.raises(UserError, match=match):
         found.load(tmp_path / name, None, None)

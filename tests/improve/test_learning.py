@@ -1,4 +1,4 @@
-"""Learning of a move, on a double integrator under PD that an unknown force pushes."""
+"""Iterative learning of a move, on a double integrator under PD control with an unknown force."""
 
 import numpy as np
 import pytest
@@ -11,8 +11,8 @@ DT, K, GAIN, D = 0.001, 50.0, 20.0, 1.5
 BY = learning.Learner(GAIN, D, 0.5 * DT, 12.0, DT, 2.0)
 
 
-def moved(values, push):
-    """Error (ticks,) over the move, with the learned values."""
+def tracking_error(values, push):
+    """Tracking error (ticks,) over the move, with the learned values."""
     settings = iterative_learning.IterativeLearningSettings(duration=BY.duration, values=list(values))
     p = iterative_learning.build(settings, DT)
     x = v = 0.0
@@ -28,15 +28,15 @@ def moved(values, push):
 
 
 @pytest.mark.parametrize("push", [lambda x: -0.8, lambda x: -0.5 * np.sin(9 * x), lambda x: -0.3 * (x > 0.4)])
-def test_the_error_falls_run_by_run(push):
+def test_learning_reduces_the_rms_error_run_by_run(push):
     values, rms = np.zeros(learning.count(BY)), []
     for _ in range(7):
-        error = moved(values, push)
+        error = tracking_error(values, push)
         rms.append(float(np.sqrt(np.mean(error**2))))
         values = learning.learned(BY, values, error)
     assert rms[1] < 0.5 * rms[0] and rms[-1] < 0.1 * rms[0]
 
 
-def test_values_are_as_fine_as_the_loop_follows():
+def test_number_of_learned_values_follows_the_bandwidth_up_to_a_limit():
     assert learning.count(BY) == 8 * 12 * 2
     assert learning.count(BY._replace(duration=1000.0)) == iterative_learning.MOST

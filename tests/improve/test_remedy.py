@@ -5,7 +5,7 @@ from rtctl.improve.remedy import written
 EFFECTS = [{"term": "a"}, {"term": "b"}, {"term": "c"}]
 
 
-def test_only_what_does_something_is_written():
+def test_config_omits_compensations_of_size_zero():
     values = {
         "law.compensation.feedforward.lead": 1e-3,
         "law.compensation.feedforward.effects.2.share": 0.9,
@@ -25,5 +25,5 @@ def test_only_what_does_something_is_written():
     }  # fmt: skip
 
 
-def test_nothing_kept_is_nothing_written():
+def test_no_values_give_an_empty_config_change():
     assert written({}, EFFECTS) == {}

@@ -1,4 +1,4 @@
-"""Table of a sensor's error."""
+"""Error table of a sensor."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from rtctl.laws import error_table
     {"term": "sensor.scale", "relative": 0.01},
     {"term": "ripple.encoder", "A": 0.004, "order": 1},
 ])  # fmt: skip
-def test_the_reading_is_put_right_over_the_travel(entry, with_sizes):
+def test_error_table_corrects_the_reading_over_the_travel(entry, with_sizes):
     config = set_paths(with_sizes(), {"plant.physics": [{**entry, "node": "encoder"}]})
     table, anchored = sensor_table.of(found.of_config(config, "a test"), (0.0, 12.0))
     p = error_table.build(error_table.ErrorTableSettings(**table), 0.001)
@@ -24,6 +24,6 @@ def test_the_reading_is_put_right_over_the_travel(entry, with_sizes):
     assert not anchored  # a counter
 
 
-def test_other_sensors_need_no_table(with_sizes):
+def test_sensor_outside_the_loop_gets_no_error_table(with_sizes):
     config = set_paths(with_sizes(), {"plant.physics": [{"term": "sensor.scale", "node": "scale", "relative": 0.01}]})
     assert sensor_table.of(found.of_config(config, "a test"), (0.0, 12.0)) is None

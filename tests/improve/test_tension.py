@@ -1,4 +1,4 @@
-"""Tension of the tape as a remedy, for a machine whose law sets one."""
+"""Tape tension as a remedy, for a machine whose law sets a tension."""
 
 import pytest
 
@@ -16,10 +16,10 @@ def proposed(name, entry):
     return tension(Ground(found, None, None, None, (0.0, 1.0)), found.effects[0])
 
 
-def test_tensions_around_the_present_one_are_tried():
+def test_remedy_tries_tensions_around_the_present_tension():
     remedy = proposed("ivu", SLACK)
     assert [way["law.tension.F_t"] for way in remedy.ways] == [pytest.approx(0.1 * f) for f in (2.0, 1.5, 3.0, 0.7)]
 
 
-def test_a_machine_that_sets_no_tension_has_none_to_change():
+def test_machine_without_a_tension_setting_has_no_tension_remedy():
     assert proposed("ivu-old", LONGER) is None

@@ -1,11 +1,11 @@
-"""Remedies of a machine whose two drives pull in turn, and which accelerates its reels beside the command."""
+"""Remedies of the reel unit: two drives that pull alternately, reels that are accelerated by the law."""
 
 from rtctl.cli.common import load_config
 from rtctl.improve import found
 from rtctl.improve.improve import improve
 
 
-def test_the_disturbance_observer_of_the_reel_unit_takes_neither_the_reels_nor_the_other_drive_for_a_disturbance():
+def test_disturbance_observer_of_the_reel_unit_excludes_reel_inertia_and_the_other_drive():
     r = improve(found.of_config(load_config("ivu", []), "a test"), written_too=False)
     tried = {one.remedy.kind: one for one in r.tried}
     assert tried["observer"].kept, tried["observer"].reason

@@ -20,7 +20,7 @@ VARIABLES = (  # name, causality, variability, unit, type
 
 
 def library(folder: Path, without: str = "") -> Path | None:
-    """The shared library, which exports what a run calls and no more; None where there is no compiler.
+    """Shared library that exports only the functions of a run; None without a compiler.
 
     The function `without` is left out.
     """

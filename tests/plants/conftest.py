@@ -1,4 +1,4 @@
-"""What tests of the plants share."""
+"""Shared fixtures of the plant tests."""
 
 from collections.abc import Callable
 from typing import Any
@@ -9,7 +9,7 @@ from numba.core.runtime import _nrt_python, rtsys  # type: ignore[attr-defined]
 
 @pytest.fixture
 def allocations() -> Callable[..., int]:
-    """How many blocks of memory a call of a compiled function takes, by numba's own counter."""
+    """Function (compiled function, arguments) -> number of memory blocks that a call allocates, counted by numba."""
 
     def count(function: Any, *arguments: Any) -> int:
         function(*arguments)

@@ -1,4 +1,4 @@
-"""One mass on a guide against its closed-form motions."""
+"""Linear axis of one mass against closed-form motions."""
 
 import math
 from typing import Any
@@ -29,7 +29,7 @@ def run(s, n):
         linear.advance(s.m)
 
 
-def test_viscous_friction_alone_lets_the_speed_decay_exponentially():
+def test_viscous_friction_gives_an_exponential_speed_decay():
     s = plant(F_c=0.0)
     s.m.x[1] = 0.5
     run(s, 1000)
@@ -37,7 +37,7 @@ def test_viscous_friction_alone_lets_the_speed_decay_exponentially():
     np.testing.assert_allclose(s.m.x[:2], [0.5 * M / F_V * (1 - fall), 0.5 * fall], rtol=1e-10)
 
 
-def test_a_spring_swings_at_its_frequency_and_keeps_its_energy():
+def test_spring_has_its_natural_frequency_and_conserves_energy():
     k = 4e4
     w = math.sqrt(k / M)
     s = plant(h=1e-3, F_c=0.0, F_v=0.0, k=k)
@@ -49,7 +49,7 @@ def test_a_spring_swings_at_its_frequency_and_keeps_its_energy():
 
 @settings(deadline=None, max_examples=20)
 @given(st.floats(0.05, 1.0), st.sampled_from([-1, 1]))
-def test_coasting_ends_where_dry_and_viscous_friction_say(speed, sign):
+def test_coasting_distance_under_dry_and_viscous_friction(speed, sign):
     """M v v' = -F_v v - F_c: x = M/F_v (v - F_c/F_v ln(1 + F_v v / F_c))."""
     s = plant()
     s.m.x[1] = sign * speed
@@ -59,7 +59,7 @@ def test_coasting_ends_where_dry_and_viscous_friction_say(speed, sign):
     assert s.m.x[0] * sign == pytest.approx(wanted, abs=2e-7)
 
 
-def test_volts_drive_it_to_the_speed_where_friction_balances():
+def test_constant_voltage_gives_the_speed_of_the_force_balance():
     s = plant()
     s.m.u[0] = 5.0
     run(s, 10_000)
@@ -67,7 +67,7 @@ def test_volts_drive_it_to_the_speed_where_friction_balances():
 
 
 @pytest.mark.parametrize(("volts", "moves"), [(0.57, False), (0.59, True)])
-def test_it_breaks_away_where_the_drive_beats_dry_friction(volts, moves):
+def test_axis_breaks_away_above_the_dry_friction(volts, moves):
     s = plant()
     s.m.u[0] = volts
     run(s, 1000)
@@ -76,7 +76,7 @@ def test_it_breaks_away_where_the_drive_beats_dry_friction(volts, moves):
         assert s.m.x[0] == pytest.approx(0.0, abs=1e-15)
 
 
-def test_state_space_is_what_the_axis_does_without_dry_friction():
+def test_state_space_matrices_of_the_axis_without_dry_friction():
     p = axis.build(axis.AxisSettings(parameters={"k": 100.0}), 1e-3)
     A, B = axis.state_space(p)
     np.testing.assert_allclose(A, [[0.0, 1.0], [-100 / M, -F_V / M]])

@@ -36,14 +36,14 @@ def given(file, **changes):
 
 
 def position(t, mass=M):
-    """Of the carriage t s after 1 V came on, m."""
+    """Position of the carriage (m), t seconds after a step of 1 V."""
     a = D / mass
     return K / D * (t - (1 - math.exp(-a * t)) / a)
 
 
 @pytest.mark.parametrize("version", [2, 3])
 @pytest.mark.parametrize("ticks", [1, 5])
-def test_it_moves_as_its_equations_say_in_our_units(library, tmp_path, version, ticks):
+def test_fmu_carriage_moves_by_its_equations_in_si_units(library, tmp_path, version, ticks):
     fmu = Fmu(given(carriage.pack(tmp_path / "c.fmu", library, version), ticks=ticks), *AXIS, 1e-3)
     assert fmu.readings == [0.0]
     for n in range(500):
@@ -52,13 +52,13 @@ def test_it_moves_as_its_equations_say_in_our_units(library, tmp_path, version, 
     fmu.close()
 
 
-def test_parameters_are_set_before_it_starts(library, tmp_path):
+def test_parameters_are_set_before_initialisation(library, tmp_path):
     fmu = Fmu(given(carriage.pack(tmp_path / "c.fmu", library), parameters={"m": 10.0}), *AXIS, 0.5)
     assert fmu.tick([1.0])[0] == pytest.approx(position(0.5, 10.0), rel=1e-9)
     fmu.close()
 
 
-def test_a_unit_that_the_fmu_does_not_say_is_taken_from_the_config(library, tmp_path):
+def test_missing_unit_of_an_fmu_variable_comes_from_the_config(library, tmp_path):
     file = carriage.pack(tmp_path / "c.fmu", library)
     assert plan(given(file, outputs={"sensor": "bare"}, units={"bare": "um"}), *AXIS, 1e-3).outputs[0][1] == 1e6
     assert plan(given(file, outputs={"sensor": "bare"}), *AXIS, 1e-3).outputs[0][1] == 1.0
@@ -79,7 +79,7 @@ def test_a_unit_that_the_fmu_does_not_say_is_taken_from_the_config(library, tmp_
         ({"parameters": {"mass": 1.0}}, r"parameters.mass: .* has no variable 'mass'"),
     ],
 )
-def test_a_wrong_map_is_one_message(tmp_path, changes, words):
+def test_wrong_variable_map_gives_a_one_line_message(tmp_path, changes, words):
     built = tmp_path / "nothing.so"
     built.write_bytes(b"")
     with pytest.raises(UserError, match=words) as error:
@@ -97,14 +97,14 @@ def test_a_wrong_map_is_one_message(tmp_path, changes, words):
         ({"version": 3, "inner": 3e-4}, r"plant.fmu.ticks: .* steps by 0.0003 s and 0.001 s is no multiple of it"),
     ],
 )
-def test_an_fmu_that_cannot_run_here_says_why(tmp_path, options, words):
+def test_fmu_that_cannot_run_here_is_refused_with_the_reason(tmp_path, options, words):
     built = tmp_path / "nothing.so"
     built.write_bytes(b"")
     with pytest.raises(UserError, match=words):
         plan(given(carriage.pack(tmp_path / "c.fmu", built, **options)), *AXIS, 1e-3)
 
 
-def test_what_is_no_fmu_is_refused(tmp_path):
+def test_missing_file_and_file_without_an_fmu_are_refused(tmp_path):
     with pytest.raises(UserError, match="there is no such file"):
         plan(given(tmp_path / "missing.fmu"), *AXIS, 1e-3)
     (tmp_path / "text.fmu").write_text("not a zip")
@@ -113,7 +113,7 @@ def test_what_is_no_fmu_is_refused(tmp_path):
 
 
 def packed(path, names, description=None):
-    """An archive with these further files, {name: content}."""
+    """Archive with modelDescription.xml and the files `names`, {name: content}."""
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as file:
         file.writestr("modelDescription.xml", carriage.description(2) if description is None else description)
         for name, content in names.items():
@@ -136,19 +136,19 @@ LINK.external_attr = 0o120777 << 16
         ({LINK: b"/etc/passwd", **LINUX}, "the link 'resources/link'; an FMU holds plain files"),
     ],
 )
-def test_an_archive_is_checked_before_it_is_unpacked(tmp_path, names, words):
+def test_archive_is_checked_before_unpacking(tmp_path, names, words):
     with pytest.raises(UserError, match=words):
         plan(given(packed(tmp_path / "c.fmu", names)), *AXIS, 1e-3)
 
 
-def test_an_archive_that_unpacks_to_gigabytes_is_refused_by_its_directory(tmp_path, monkeypatch):
+def test_archive_above_the_unpacked_size_limit_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(fmu_file, "UNPACKED_LIMIT", 1 << 20)
     path = packed(tmp_path / "c.fmu", {"resources/zeros": bytes(2 << 20), **LINUX})
     with pytest.raises(UserError, match=r"its files are .* GiB when unpacked"):
         plan(given(path), *AXIS, 1e-3)
 
 
-def test_an_archive_with_a_damaged_or_locked_file_is_refused(tmp_path):
+def test_archive_with_a_damaged_or_encrypted_file_is_refused(tmp_path):
     path = packed(tmp_path / "c.fmu", LINUX)
     whole = path.read_bytes()
     at = whole.index(b"<?xml") if b"<?xml" in whole else 60
@@ -164,13 +164,13 @@ def test_an_archive_with_a_damaged_or_locked_file_is_refused(tmp_path):
 
 
 @pytest.mark.parametrize("missing", ["fmi2DoStep", "fmi3GetFloat64"])
-def test_a_library_without_a_function_that_is_called_names_it(library, tmp_path, missing):
+def test_missing_function_of_the_library_is_named(library, tmp_path, missing):
     built = carriage.library(tmp_path, without=missing)
     with pytest.raises(UserError, match=f"its library lacks {missing}; export it again for co-simulation"):
         Fmu(given(carriage.pack(tmp_path / "c.fmu", built, int(missing[3]))), *AXIS, 1e-3)
 
 
-def test_a_library_that_does_not_load_is_refused_and_leaves_nothing_behind(tmp_path, monkeypatch):
+def test_library_that_does_not_load_is_refused_and_its_files_are_removed(tmp_path, monkeypatch):
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "unpacked"))
     (tmp_path / "unpacked").mkdir()
     built = tmp_path / "nothing.so"
@@ -180,13 +180,13 @@ def test_a_library_that_does_not_load_is_refused_and_leaves_nothing_behind(tmp_p
     assert not list((tmp_path / "unpacked").iterdir())
 
 
-def test_a_start_value_that_it_refuses_is_said(library, tmp_path):
+def test_start_value_refused_by_the_fmu_is_reported(library, tmp_path):
     with pytest.raises(UserError, match=r"it does not start \(fmi2ExitInitializationMode.*see its parameters"):
         Fmu(given(carriage.pack(tmp_path / "c.fmu", library), parameters={"m": -1.0}), *AXIS, 1e-3)
 
 
 @pytest.mark.parametrize("version", [2, 3])
-def test_a_step_that_fails_says_when(library, tmp_path, version):
+def test_failed_step_is_reported_with_its_time(library, tmp_path, version):
     fmu = Fmu(given(carriage.pack(tmp_path / "c.fmu", library, version), parameters={"fail_at": 0.0025}), *AXIS, 1e-3)
     fmu.tick([0.0])
     fmu.tick([0.0])
@@ -195,18 +195,18 @@ def test_a_step_that_fails_says_when(library, tmp_path, version):
     fmu.close()
 
 
-def test_numbers_that_are_none_end_the_run(library, tmp_path):
+def test_nan_output_ends_the_run(library, tmp_path):
     fmu = Fmu(given(carriage.pack(tmp_path / "c.fmu", library)), *AXIS, 1e-3)
     with pytest.raises(UserError, match=r"outputs are \[nan\]"):
         fmu.tick([math.nan])
     fmu.close()
 
 
-def test_units_are_spelt_as_modelica_does():
+def test_modelica_units_are_translated():
     assert [modelica(u) for u in ("N.m", "m/s2", "rad/s", "V")] == ["N*m", "m/s^2", "rad/s", "V"]
 
 
-def test_a_file_is_looked_for_beside_the_config_first(tmp_path, monkeypatch):
+def test_fmu_path_is_resolved_beside_the_config_first(tmp_path, monkeypatch):
     (tmp_path / "there").mkdir()
     (tmp_path / "there" / "carriage.fmu").touch()
     config = yaml.safe_load((CONFIGS / "axis.yaml").read_text())
@@ -216,4 +216,4 @@ def test_a_file_is_looked_for_beside_the_config_first(tmp_path, monkeypatch):
     found = load_settings(tmp_path / "there" / "axis.yaml", AxisConfig, ["plant.fmu.ticks=2"])
     assert found.plant.fmu.file == str(tmp_path / "there" / "carriage.fmu")
     elsewhere = load_settings(tmp_path / "there" / "axis.yaml", AxisConfig, ["plant.fmu.file=other.fmu"])
-    assert elsewhere.plant.fmu.file == "other.fmu"  # and what is not there is said by `plan`
+    assert elsewhere.plant.fmu.file == "other.fmu"  # `plan` reports a missing file

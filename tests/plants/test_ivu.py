@@ -1,4 +1,4 @@
-"""The two-reel unit against the numbers of the thesis (chapters 4, 6, 8, appendix A) and its checked errata."""
+"""Two-reel unit against the values of the thesis (chapters 4, 6, 8, appendix A) and its errata."""
 
 import math
 from functools import lru_cache
@@ -19,9 +19,9 @@ COUNT = 2 * math.pi / 10_000  # of the capstan encoder, rad
 AMP_PER_VOLT = 0.2
 DRIVER = l292.L292Settings()
 DRIVE = (*l292.second_order(DRIVER), DRIVER.R_F * DRIVER.C_F)
-DELAY = 3e-3  # s, of the loop in 8.2
+DELAY = 3e-3  # s, delay of the loop in 8.2
 G, TAU_D = 6.2, 0.16  # A/rad, s
-FREE: dict[str, Any] = {"tau_F1": 0.0, "tau_F2": 0.0, "tau_Fc": 0.0}  # of friction
+FREE: dict[str, Any] = {"tau_F1": 0.0, "tau_F2": 0.0, "tau_Fc": 0.0}  # parameters without friction
 
 
 def built(name: str = "identified", h: float = 5e-4, **parameters: float) -> ivu.IvuParams:
@@ -29,7 +29,7 @@ def built(name: str = "identified", h: float = 5e-4, **parameters: float) -> ivu
 
 
 def plant(p: ivu.IvuParams) -> tuple[Any, Any]:
-    """Params and state as records, at the start."""
+    """Params and initial state as records."""
     rows = np.zeros(1, record_dtype(p)).view(np.recarray)
     fill_record(rows[0], p)
     s = np.zeros(1, ivu.IVU_STATE).view(np.recarray)[0]
@@ -39,7 +39,7 @@ def plant(p: ivu.IvuParams) -> tuple[Any, Any]:
 
 @tick
 def run(p, s, n):
-    """`n` substeps with the inputs that stand in the state."""
+    """`n` substeps with the inputs of the state."""
     for _ in range(n):
         linear.midpoint(s.m)
         graph.weigh(p.graph, s.m)
@@ -60,7 +60,7 @@ def record_run(p, s, u, every, out):
 
 @tick
 def closed_run(p, s, ref, every, T1, T2, out):
-    """PD of 8.2 at 500 Hz on the capstan itself, no quantisation; tension on both, one motor pulls (5.1)."""
+    """PD law of 8.2 at 500 Hz on the unquantised capstan angle; tension on both motors, one motor pulls (5.1)."""
     e = 0.0
     d = 0.0
     u = 0.0
@@ -76,7 +76,7 @@ def closed_run(p, s, ref, every, T1, T2, out):
 
 
 def response(p: ivu.IvuParams, f: np.ndarray, driver: bool = True) -> np.ndarray:
-    """Capstan angle in rad per ampere on motor 1; with or without the lag of its driver."""
+    """Frequency response of the capstan angle in rad per ampere on motor 1, with or without the driver lag."""
     A, B = ivu.state_space(p)
     n, b = (len(A), B[:, 0] / AMP_PER_VOLT) if driver else (2 * ivu.NQ, A[: 2 * ivu.NQ, 2 * ivu.NQ])
     return np.array([np.linalg.solve(2j * np.pi * x * np.eye(n) - A[:n, :n], b[:n])[ivu.CAPSTAN] for x in f])
@@ -95,7 +95,7 @@ def process_gain(p: ivu.IvuParams) -> float:
 
 
 def margins(driver: bool = False, **radii: Any) -> tuple[float, float, float]:
-    """Gain margin in dB, phase margin in degrees, crossover in Hz of the PD loop with delay."""
+    """Gain margin in dB, phase margin in degrees and crossover in Hz of the PD loop with delay."""
     f = np.geomspace(1.0, 200.0, 4000)
     L = response(built(**radii), f, driver) * G * (1 + 2j * np.pi * f * TAU_D) * np.exp(-2j * np.pi * f * DELAY)
     gain, phase = np.abs(L), np.unwrap(np.angle(L))
@@ -132,14 +132,14 @@ def test_process_gain_of_the_simulation_set():
     assert process_gain(built("simulation", R1=0.02, R2=0.02, J_m1=1.5e-3, J_m2=1.5e-3)) == pytest.approx(32, rel=0.02)
 
 
-def test_inertia_of_the_reels():
+def test_reel_inertia_follows_from_the_radius_or_the_given_value():
     p = built()
     assert pytest.approx((1.91e-4, 8.3e-6), rel=5e-3) == (p.J_1, p.J_2)
     assert built(J_1=5e-4).J_1 == 5e-4
 
 
-def test_end_deflection_under_tension():
-    """Erratum: section 6.1 prints twice as much."""
+def test_reel_deflection_under_tension_of_the_simulation_set():
+    """Erratum: section 6.1 prints twice the value."""
     p, s = plant(built("simulation", h=1e-3, R1=0.03, R2=0.03, d_tape=0.0, **FREE))
     s.m.u[:2] = 0.049 / AMP_PER_VOLT
     run(p, s, 20_000)
@@ -159,17 +159,17 @@ def test_margins_of_the_pd_loop():
 def test_gain_margin_over_the_radii(R1, R2, dB):
     """Erratum: 'stable for the complete range of reel radii' is true, but barely; hence gain scheduling."""
     assert margins(R1=R1, R2=R2)[0] == pytest.approx(dB, abs=0.1)
-    assert margins(R1=R1, R2=R2, driver=True)[0] == pytest.approx(dB, abs=0.2)  # what the driver's lag costs
+    assert margins(R1=R1, R2=R2, driver=True)[0] == pytest.approx(dB, abs=0.2)  # with the lag of the driver
 
 
-def test_the_driver_has_the_gain_of_the_data_sheet():
+def test_driver_gain_matches_the_data_sheet():
     A, B = ivu.state_space(built())
     a = 2 * ivu.NQ
     assert -np.linalg.solve(A[a : a + 2, a : a + 2], B[a : a + 2, 0])[0] == pytest.approx(AMP_PER_VOLT)
 
 
-def test_rigid_rotation_keeps_its_eigenvalue():
-    """All that turns together, turns on: in an hour the capstan would creep by less than a count."""
+def test_rigid_rotation_is_an_eigenvector_with_eigenvalue_one():
+    """Rigid rotation persists: the drift of the capstan is below one count per hour."""
     for p in (built(), built("simulation"), built(R1=0.02, R2=0.04)):
         _, s = plant(p)
         rigid = np.zeros(ivu.NX)
@@ -198,7 +198,7 @@ def test_radius_wound_length_and_inertia_agree(q, R1, R2):
 
 
 def exact_accelerations(p: Any, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """(4.9)-(4.17) with the radii that q gives, written out."""
+    """Accelerations (5,) by (4.9)-(4.17) with the radii at q."""
     grow = p.d_tape / (2 * math.pi)
     R1, R2 = p.R1 + grow * q[ivu.REEL1], p.R2 + grow * q[ivu.REEL2]
     J1, J2 = (reel.reel_inertia(p.J_10, p.rho_h, R, p.R_min) for R in (R1, R2))
@@ -217,8 +217,8 @@ def exact_accelerations(p: Any, q: np.ndarray, v: np.ndarray) -> np.ndarray:
 
 @settings(deadline=None, max_examples=30)
 @given(st.floats(-20, 20), st.lists(st.floats(-1, 1), min_size=9, max_size=9))
-def test_linear_model_and_correction_make_the_equations_of_motion(turned, x):
-    """Wherever the tape has gone, between two relinearisations too."""
+def test_linear_model_and_radius_correction_give_the_equations_of_motion(turned, x):
+    """At any wound length, also between two relinearisations."""
     record, s = plant(built(R1=0.03, R2=0.03))
     q = np.array([turned, turned, 0.03 * turned / 0.0125, -turned, -turned])
     q[:4] += 0.02 * np.array(x[:4])
@@ -236,8 +236,8 @@ def driven(p: ivu.IvuParams, volts: np.ndarray, dt: float) -> tuple[Any, Any, np
     return record, s, out
 
 
-def test_tape_that_leaves_one_reel_arrives_at_the_other():
-    """A turn of the reels: paper is neither made nor lost, but for the stretch."""
+def test_tape_length_between_the_reels_is_conserved():
+    """Over one reel turn the wound lengths differ only by the elongation."""
     volts = np.full((4000, 2), 0.17)
     volts[:2000, 0] += 1.5
     record, s, _ = driven(built(h=1e-3), volts, 1e-3)
@@ -251,23 +251,23 @@ def test_tape_that_leaves_one_reel_arrives_at_the_other():
     assert record.R_c * x[ivu.CAPSTAN] == pytest.approx(l1, abs=2e-3)
     assert (
         pytest.approx(record.d_tape * l1 / math.pi, rel=1e-4) == s.m.reel_R[0] ** 2 - record.R1**2
-    )  # taken at the middle of the substep
+    )  # evaluated at the middle of the substep
     assert pytest.approx(reel.reel_inertia(record.J_10, record.rho_h, s.m.reel_R[0], record.R_min)) == s.m.reel_J[0]
     assert s.m.reel_R[0] > record.R1 and s.m.reel_R[1] < record.R2
 
 
-def test_an_empty_reel_keeps_its_core():
+def test_empty_reel_keeps_the_core_radius_and_inertia():
     volts = np.full((6000, 2), 0.1)
     volts[:, 0] += 1.5
     record, s, _ = driven(built(h=1e-3, R2=0.0202), volts, 1e-3)
-    assert record.R2 + record.d_tape / (2 * math.pi) * s.m.x[ivu.REEL2] < record.R_min  # it has run out
+    assert record.R2 + record.d_tape / (2 * math.pi) * s.m.x[ivu.REEL2] < record.R_min  # the reel is empty
     assert record.R_min == s.m.reel_R[1]
     assert pytest.approx(record.J_20, rel=1e-6) == s.m.reel_J[1]
     assert np.all(np.isfinite(s.m.x))
 
 
 def stored(p: Any, s: Any) -> float:
-    """Energy in J of a machine whose radii stand still."""
+    """Energy in J at the present radii."""
     q, v = s.m.x[: ivu.NQ], s.m.x[ivu.NQ : 2 * ivu.NQ]
     inertia = np.array([p.J_m1, s.m.reel_J[0], p.J_c, s.m.reel_J[1], p.J_m2])
     grow = p.d_tape / (2 * math.pi)
@@ -279,8 +279,8 @@ def stored(p: Any, s: Any) -> float:
 
 @settings(deadline=None, max_examples=15)
 @given(st.lists(st.floats(-1, 1), min_size=10, max_size=10), st.sampled_from([0.0, 0.5e-3]))
-def test_left_to_itself_it_only_loses_energy(x, d_tape):
-    """Passive, also while radii follow the tape: layers that land and leave bring and take their own momentum."""
+def test_energy_of_the_undriven_unit_never_increases(x, d_tape):
+    """Passive also with changing radii: tape layers carry their momentum to and from the reels."""
     record, s = plant(built(d_tape=d_tape, **FREE))
     s.m.x[:5] = 0.02 * np.array(x[:5])
     s.m.x[5:10] = 3.0 * np.array(x[5:])
@@ -294,7 +294,7 @@ def test_left_to_itself_it_only_loses_energy(x, d_tape):
     assert last < first + 1e-12
 
 
-def test_with_friction_it_comes_to_rest():
+def test_unit_with_friction_comes_to_rest():
     volts = np.zeros((6000, 2))
     volts[:500, 0] = 0.5
     _, s, _ = driven(built(h=1e-3), volts, 1e-3)
@@ -303,14 +303,14 @@ def test_with_friction_it_comes_to_rest():
 
 @lru_cache(maxsize=8)
 def open_loop(h: float) -> np.ndarray:
-    """Ten seconds, one reversal a second; volts switch on whole seconds."""
+    """Open-loop run of 10 s with a reversal each second; volts switch on whole seconds."""
     wave = 0.5 * np.where((np.arange(5000) // 500) % 2 == 0, 1.0, -1.0)
     return driven(built(h=h), 0.17 + np.stack([wave, -wave], axis=1), 2e-3)[2]
 
 
 @lru_cache(maxsize=8)
 def closed_loop(h: float) -> np.ndarray:
-    """Steps of a radian to and fro, shaped, under the PD of 8.2."""
+    """Closed-loop run with shaped steps of 1 rad under the PD law of 8.2."""
     t = np.arange(4000) * 2e-3
     ref = np.zeros(len(t))
     for begin, size in ((0.5, 1.0), (3.0, -1.0), (5.5, -1.0)):
@@ -330,23 +330,23 @@ def test_integration_error_is_below_a_tenth_of_a_count(loop):
     assert capstan.max() < 0.1 * COUNT
 
 
-def test_integration_error_against_the_limit_of_short_steps():
-    """What halving does not show: a motor that breaks loose while its current still rises, in a tenth of a millisecond.
+def test_integration_error_against_a_substep_16_times_shorter():
+    """Step halving does not show this error: a motor breaks away while its current still rises, within 0.1 ms.
 
-    The whole substep is then taken to slide, which costs some 1e-4 rad/s once; it is never a count.
+    The model then slides for the whole substep: about 1e-4 rad/s once, below one count.
     """
     assert np.abs(open_loop(5e-4) - open_loop(5e-4 / 16))[:, 0].max() < 0.5 * COUNT
 
 
-def test_a_substep_allocates_nothing(allocations):
+def test_substep_allocates_no_memory(allocations):
     record, s = plant(built())
     s.m.u[:2] = 0.3
     assert allocations(run, record, s, 1000) == allocations(run, record, s, 1)
 
 
-def test_motors_behind_their_gear():
+def test_motor_parameters_of_appendix_e_are_reflected_through_the_gear():
     """Appendix E: 61 mNm/A and 24 mA without load, times 150.4."""
     p = ivu.parameters(ivu.IvuSettings(set="appendix_e"))
     assert p.K_m1 == p.K_m2 == pytest.approx(150.4 * 61e-3, rel=1e-3)
     assert p.tau_F1 == p.tau_F2 == pytest.approx(150.4 * 61e-3 * 24e-3, rel=2e-3)
-    assert p.tau_F1 / p.R_min > 10.0  # N, with which a tape would turn it back
+    assert p.tau_F1 / p.R_min > 10.0  # N of tape tension to back-drive the gear

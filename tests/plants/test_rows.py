@@ -1,4 +1,4 @@
-"""The sum in vector registers has the bits of the plain loop."""
+"""The sum in vector registers is bit-identical to the plain loop."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ def compiled(out, n, P, x, nx, G, u, nu, f, nf):
 
 
 @pytest.mark.parametrize(("n", "nu", "nf"), [(2, 1, 1), (10, 1, 4), (14, 2, 5), (16, 0, 0), (17, 4, 7), (36, 4, 12)])
-def test_it_adds_in_the_order_of_the_rows(n, nu, nf):
+def test_vectorised_sum_is_bit_identical_to_the_plain_loop(n, nu, nf):
     rng, width = np.random.default_rng(n), 3 * LANES
     P, G = rng.normal(size=(width, width)), rng.normal(size=(nu + nf + 1, width)) * 1e3
     x, u, f = rng.normal(size=width), rng.normal(size=nu + 1), rng.normal(size=nf + 1)

@@ -1,4 +1,4 @@
-"""The descriptions of the three machines are the equations of the thesis."""
+"""The descriptions of the three machines give the equations of the thesis."""
 
 from typing import Any
 
@@ -39,7 +39,7 @@ def started(p: Any) -> Any:
     return s
 
 
-def same(got: tuple, wanted: tuple) -> None:
+def assert_same_matrices(got: tuple, wanted: tuple) -> None:
     for one, two in zip(got, wanted, strict=True):
         assert np.abs(one - two).max() <= 1e-13 * np.abs(two).max()
         assert np.array_equal(one == 0.0, two == 0.0)
@@ -48,17 +48,17 @@ def same(got: tuple, wanted: tuple) -> None:
 @pytest.mark.parametrize("name", ivu.SETS)
 def test_state_space_of_the_two_reel_unit(name):
     p = ivu.build(ivu.IvuSettings(set=name), 5e-4, DRIVES)
-    same(ivu.state_space(p), thesis.ivu(p, DRIVES))
+    assert_same_matrices(ivu.state_space(p), thesis.ivu(p, DRIVES))
 
 
 @pytest.mark.parametrize("name", ldu.SETS)
 def test_state_space_of_the_linear_drive(name):
     p = ldu.build(ldu.LduSettings(set=name), 5e-5, (6e3, 0.7))
-    same(ldu.state_space(p), thesis.ldu(p, 6e3, 0.7))
+    assert_same_matrices(ldu.state_space(p), thesis.ldu(p, 6e3, 0.7))
 
 
-def test_reels_wind_as_the_thesis_says_they_do():
-    """0.4 s of winding across relinearisations: 1e-6 of the way, without a part of the kernel."""
+def test_winding_motion_matches_the_integrated_equations_of_the_thesis():
+    """0.4 s of winding across relinearisations against Runge-Kutta; relative error 2e-6 of the angles."""
     p = ivu.build(ivu.IvuSettings(parameters={**FREE, "d_tape": 2e-3}), 1e-4, DRIVES)
     s = started(p)
     run(p.graph, s, 4000)
@@ -68,7 +68,7 @@ def test_reels_wind_as_the_thesis_says_they_do():
     np.testing.assert_allclose(s.m.x[5:10], wanted[5:], rtol=0, atol=5e-6 * np.abs(wanted[5:]).max())
 
 
-def test_the_linear_drive_moves_as_its_matrices_say():
+def test_motion_of_the_linear_drive_matches_the_matrix_exponential():
     p = ldu.build(ldu.LduSettings(parameters={"F_c": 0.0}), 5e-5, (6e3, 0.7))
     A, B = thesis.ldu(p, 6e3, 0.7)
     M = np.zeros((11, 11))
@@ -81,7 +81,7 @@ def test_the_linear_drive_moves_as_its_matrices_say():
 
 
 @pytest.mark.parametrize("module", [ivu, ldu, axis])
-def test_names_and_numbers_of_a_machine_are_those_of_its_description(module):
+def test_node_names_and_indices_of_a_plant_match_its_description(module):
     at = module.described().layout
     for name, number in module.NODES.items():
         assert at.coordinate(name) == number
@@ -97,8 +97,8 @@ def test_names_and_numbers_of_a_machine_are_those_of_its_description(module):
 
 
 @pytest.mark.parametrize("module", [ivu, ldu, axis])
-def test_every_number_of_a_set_reaches_the_machine(module):
-    """A symbol without a place would be a parameter that a fit moves in vain."""
+def test_every_parameter_of_a_set_changes_the_machine(module):
+    """A parameter without effect on the machine could not be fitted."""
     build = {ivu: (DRIVES,), ldu: ((6e3, 0.7),), axis: ()}[module]
     kind = module.__name__.rpartition(".")[2].capitalize()
     settings = getattr(module, f"{kind}Settings")
@@ -113,6 +113,6 @@ def test_every_number_of_a_set_reaches_the_machine(module):
         assert not np.array_equal(numbers(**{name: 1.01 * value + 1e-6}), before) or name in ("J_10", "J_20"), name
 
 
-def test_a_described_machine_may_have_the_layout_of_a_shipped_one():
+def test_description_of_a_shipped_machine_has_its_layout():
     machine = ldu.described().layout.machine
     assert layout(Description.model_validate(machine.model_dump())).nq == ldu.NQ

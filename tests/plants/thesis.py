@@ -1,4 +1,4 @@
-"""Equations of the three machines as the thesis writes them, apart from plants/: what the descriptions have to be."""
+"""Equations of the two-reel unit and the linear drive from the thesis, independent of plants/."""
 
 from typing import Any
 
@@ -6,7 +6,7 @@ import numpy as np
 
 
 def accelerations(p: Any, q: np.ndarray, v: np.ndarray, torque: np.ndarray) -> np.ndarray:
-    """Of the two-reel unit (4.9)-(4.17), in the order motor 1, reel 1, capstan, reel 2, motor 2; `torque` (5,), Nm."""
+    """Accelerations (5,) by (4.9)-(4.17): motor 1, reel 1, capstan, reel 2, motor 2; `torque` (5,), Nm."""
     grow = p.d_tape / (2 * np.pi)
     R1, R2 = p.R1 + grow * q[1], p.R2 + grow * q[3]
     J1 = p.J_1 + 0.5 * np.pi * p.rho_h * (R1**4 - p.R1**4)
@@ -22,7 +22,7 @@ def accelerations(p: Any, q: np.ndarray, v: np.ndarray, torque: np.ndarray) -> n
 
 
 def runge_kutta(p: Any, torque: np.ndarray, seconds: float, steps: int) -> np.ndarray:
-    """State (10,) of the two-reel unit after `seconds` from rest under torques that are held."""
+    """State (10,) of the two-reel unit after `seconds` from rest under constant torques."""
     h, x = seconds / steps, np.zeros(10)
 
     def rate(x: np.ndarray) -> np.ndarray:
@@ -38,7 +38,7 @@ def runge_kutta(p: Any, torque: np.ndarray, seconds: float, steps: int) -> np.nd
 
 
 def ivu(p: Any, drives: list) -> tuple[np.ndarray, np.ndarray]:
-    """A (14, 14) and B (14, 2) of the two-reel unit at its starting radii."""
+    """A (14, 14) and B (14, 2) of the two-reel unit at its initial radii."""
     A, B = np.zeros((14, 14)), np.zeros((14, 2))
     A[:5, 5:10] = np.eye(5)
     zero = np.zeros(5)

@@ -1,4 +1,4 @@
-"""Two programs on the same cases: what differs, and which of them is right."""
+"""Comparison of two programs on the same cases: differences, and the better program in each case."""
 
 import json
 import shutil
@@ -17,7 +17,7 @@ NOTHING = {"verdict": "nothing", "effects": []}
 
 
 def folder_of(path, *found):
-    """A sealed folder of single effects with the diagnoses `found`."""
+    """Sealed folder of single-effect cases with the diagnoses `found`."""
     common = {"kind": "single", "size": 1.0, "plant": "axis", "ratio": 9.0, "true_parameters": {}}
     cases = {f"case-{n:04}": {**common, "effects": [EFFECT]} for n in range(1, len(found) + 1)}
     for name, diagnosis in zip(cases, found, strict=True):
@@ -29,35 +29,35 @@ def folder_of(path, *found):
 
 @pytest.fixture
 def folders(tmp_path):
-    """What the program says, and what it said before."""
+    """Folders with the diagnoses of the present and of the earlier program."""
     return folder_of(tmp_path / "now", LAG, LAG, DELAY), folder_of(tmp_path / "before", NOTHING, LAG, LAG)
 
 
-def test_each_case_that_differs_is_better_or_worse(folders):
+def test_changed_answers_are_better_or_worse(folders):
     found = against.pairs(*folders)
     assert [(p.case, p.change) for p in found] == [("case-0001", "better"), ("case-0003", "worse")]
     assert (found[0].before, found[0].now) == ("nothing", "named drive.lag:drive")
     assert "1 better, 1 worse" in against.words(found)
 
 
-def test_the_same_answers_are_told_in_one_sentence(folders):
+def test_equal_answers_are_reported_in_one_sentence(folders):
     now, _ = folders
     assert against.words(against.pairs(now, now)) == "both programs answer all cases alike"
 
 
-def test_a_case_without_an_answer_is_left_out(folders):
+def test_case_without_an_answer_is_omitted(folders):
     now, before = folders
     shutil.rmtree(before / "case-0001" / "diagnosis")
     assert [p.case for p in against.pairs(now, before)] == ["case-0003"]
 
 
-def test_other_cases_are_refused(folders, tmp_path):
+def test_folder_with_other_cases_is_refused(folders, tmp_path):
     now, _ = folders
     with pytest.raises(UserError, match="holds other cases than"):
         against.pairs(now, folder_of(tmp_path / "other", LAG))
 
 
-def test_the_command_prints_both_programs(folders, monkeypatch):
+def test_command_prints_the_answers_of_both_programs(folders, monkeypatch):
     now, before = folders
     monkeypatch.setattr(prove, "prepare", lambda *_: "hash")
     asked = ["--count", "3", "--out", str(now), "--against", str(before)]

@@ -1,4 +1,4 @@
-"""The pictures of the scores are drawn from what the scores hold."""
+"""Figures of the scores: reliability diagram and confusion matrix."""
 
 from pathlib import Path
 
@@ -26,13 +26,13 @@ SCORES = {
 
 @pytest.fixture
 def drawn(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
-    """Figures instead of files."""
+    """Figures that would be saved to files."""
     kept: list[Figure] = []
     monkeypatch.setattr(Figure, "savefig", lambda self, *_, **__: kept.append(self))
     return kept
 
 
-def test_reliability_has_a_point_and_its_count_for_each_bin(drawn: list[Figure], tmp_path: Path) -> None:
+def test_reliability_diagram_has_a_point_and_a_count_for_each_bin(drawn: list[Figure], tmp_path: Path) -> None:
     figures.reliability(SCORES, tmp_path / "reliability.png")
     (axes,) = drawn[0].axes
     points = [line.get_xydata().tolist() for line in axes.lines if line.get_marker() == "o"]
@@ -40,7 +40,9 @@ def test_reliability_has_a_point_and_its_count_for_each_bin(drawn: list[Figure],
     assert [text.get_text().strip() for text in axes.texts] == ["4", "26"]
 
 
-def test_confusion_has_single_truths_in_rows_and_their_cases_in_cells(drawn: list[Figure], tmp_path: Path) -> None:
+def test_confusion_matrix_has_single_truths_in_rows_and_case_counts_in_cells(
+    drawn: list[Figure], tmp_path: Path
+) -> None:
     figures.confusion(SCORES, tmp_path / "confusion.png")
     (axes,) = drawn[0].axes
     truths = [label.get_text() for label in axes.get_yticklabels()]
@@ -49,4 +51,4 @@ def test_confusion_has_single_truths_in_rows_and_their_cases_in_cells(drawn: lis
     assert answers == ["drive.lag", "drive.offset", "ambiguous", "unnamed", "nothing"]
     cells = {(truths[int(t.get_position()[1])], answers[int(t.get_position()[0])]): t.get_text() for t in axes.texts}
     assert cells[("unknown", "drive.offset")] == "1" and cells[("null", "nothing")] == "5"
-    assert len(axes.patches) == 2  # what is right is framed
+    assert len(axes.patches) == 2  # frames of the correct cells

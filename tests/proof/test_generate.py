@@ -1,4 +1,4 @@
-"""The generator: determinism, the bundle's format, kinds in their shares, effects that show."""
+"""Case generator of the plants: determinism, bundle format, shares of the kinds, visible effects."""
 
 import itertools
 import json
@@ -15,14 +15,14 @@ from rtctl.proof.effects import TABLE
 from rtctl.proof.unknown import UNKNOWN
 
 SECONDS = {"ivu": 8.0, "ldu": 1.8, "axis": 5.0}
-WEAK = {("ldu", "timing.jitter"): 0.5}  # a tenth of a millisecond is short: it shows in fast moves alone
+WEAK = {("ldu", "timing.jitter"): 0.5}  # a jitter of 0.1 ms shows only in fast moves
 NAMES = 34  # in the table of the exchange format
 ALL = [(plant, name) for plant in g.PLANTS for name in draw.names_on(plant)]
 
 
 @pytest.fixture(scope="module")
 def machines():
-    """A short sound machine of each plant with two runs."""
+    """Nominal machine of each plant over a short time, with two runs."""
     out = {}
     for plant in g.PLANTS:
         rng = np.random.default_rng([3, len(plant)])
@@ -37,14 +37,14 @@ def machines():
     return out
 
 
-def test_every_name_has_a_plant():
+def test_every_effect_name_has_a_plant():
     assert len(TABLE) == NAMES
     assert {name for _, name in ALL} == set(TABLE)
     assert len(UNKNOWN) == 12
 
 
 @pytest.mark.parametrize(("plant", "name"), ALL)
-def test_an_effect_of_typical_size_shows(machines, plant, name):
+def test_effect_of_typical_size_is_visible(machines, plant, name):
     base, a, floor = machines[plant]
     want = WEAK.get((plant, name), 2.0)
     best = 0.0
@@ -61,7 +61,7 @@ def test_an_effect_of_typical_size_shows(machines, plant, name):
 
 
 @pytest.mark.parametrize("name", sorted(UNKNOWN))
-def test_unknown_physics_shows(machines, name):
+def test_unknown_physics_is_visible(machines, name):
     plant = next(iter(UNKNOWN[name][1]))
     base, a, floor = machines[plant]
     s, _ = g.put(base, (draw.Part(name, UNKNOWN[name][1][plant][0], 1.0),), [7])
@@ -69,7 +69,7 @@ def test_unknown_physics_shows(machines, name):
     assert run is None or g.largest(g.visibility(s, run, a, floor)) > 1.5
 
 
-def test_an_effect_leaves_the_sound_machine_alone(machines):
+def test_adding_an_effect_does_not_change_the_nominal_machine(machines):
     base, a, _ = machines["axis"]
     before = base.m.copy()
     g.put(base, (draw.Part("friction.stribeck", "carriage", 1.0),), [7])
@@ -78,8 +78,8 @@ def test_an_effect_leaves_the_sound_machine_alone(machines):
 
 
 @pytest.mark.parametrize("plant", g.PLANTS)
-def test_no_effect_takes_the_place_of_another(machines, plant):
-    """What may be drawn together is in the machine together, at numbers of their own."""
+def test_effects_of_different_families_use_different_parameters(machines, plant):
+    """Effects that may be drawn together change disjoint parameters of the machine."""
     s, _, _ = machines[plant]
     changed = {}
     for name in draw.names_on(plant):
@@ -91,23 +91,23 @@ def test_no_effect_takes_the_place_of_another(machines, plant):
                 for at in zip(*np.nonzero(np.atleast_1d(m[field] != s.m[field])), strict=True)
             }
     for (one, own), (other, others) in itertools.combinations(changed.items(), 2):
-        if one[0].split(".")[0] != other[0].split(".")[0]:  # those of one family are not drawn together
+        if one[0].split(".")[0] != other[0].split(".")[0]:  # effects of one family are not drawn together
             assert not own & others, (one, other)
 
 
-def test_kinds_come_in_their_shares():
+def test_kinds_of_cases_have_their_shares():
     kinds = Counter(draw.plan(5, i, g.PLANTS).kind for i in range(200))
     assert kinds == {
         "null": 20, "parameters": 20, "decoy": 10, "single": 70, "pair": 40, "triple": 10, "unknown": 30,
     }  # fmt: skip
 
 
-def test_singles_go_through_every_name_on_every_plant():
+def test_single_cases_cover_every_effect_on_every_plant():
     met = {(p.plant, p.parts[0].name) for p in (draw.plan(5, i, g.PLANTS) for i in range(240)) if p.kind == "single"}
     assert met == set(ALL)
 
 
-def test_a_plan_depends_on_seed_and_number_alone():
+def test_plan_depends_only_on_seed_and_case_number():
     assert draw.plan(5, 17, g.PLANTS) == draw.plan(5, 17, g.PLANTS)
     assert [draw.plan(5, i, g.PLANTS) for i in range(20)] != [draw.plan(6, i, g.PLANTS) for i in range(20)]
 
@@ -119,7 +119,7 @@ def written(tmp_path_factory):
     return folder
 
 
-def test_bundles_are_in_the_exchange_format(written):
+def test_bundles_have_the_exchange_format(written):
     answers = seal.open_seal(written)
     assert sorted(answers["cases"]) == ["case-0001", "case-0002", "case-0003"]
     for name, a in answers["cases"].items():
@@ -147,14 +147,14 @@ def test_bundles_are_in_the_exchange_format(written):
         assert json.loads((written / f"{name}-heldout" / "case.json").read_text()) == case
 
 
-def test_the_same_seed_gives_the_same_bytes(written, tmp_path):
+def test_equal_seeds_give_identical_recordings(written, tmp_path):
     name, answer = g.write_case(tmp_path, 11, 1, ("axis",), False)
     assert answer == seal.open_seal(written)["cases"][name]
     one, two = (pq.read_table(f / name / "recording.parquet") for f in (written, tmp_path))
     assert one.equals(two)
 
 
-def test_goes_on_where_it_was_stopped(written, tmp_path):
+def test_interrupted_generation_continues_with_the_next_case(written, tmp_path):
     batch.begin(tmp_path, {"seed": 11, "plants": ["axis"], "heldout": False})
     g.write_case(tmp_path, 11, 0, ("axis",), False)
     before = (tmp_path / "case-0001" / "recording.parquet").stat().st_mtime_ns
@@ -167,7 +167,7 @@ def test_goes_on_where_it_was_stopped(written, tmp_path):
     assert not (tmp_path / batch.DRAFT).exists()
 
 
-def test_wrong_requests_are_refused(written, tmp_path):
+def test_invalid_requests_are_refused(written, tmp_path):
     with pytest.raises(UserError, match="holds cases"):
         g.generate(written, 1, 1)
     with pytest.raises(UserError, match="not one of"):

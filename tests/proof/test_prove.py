@@ -1,4 +1,4 @@
-"""The whole proof with a diagnosis that is made up: goes on where it stopped, survives failures, keeps the seal."""
+"""The proof pipeline with a mock diagnosis: resumption, failures, seal."""
 
 import json
 from threading import Event
@@ -29,8 +29,8 @@ def folder(tmp_path):
     return tmp_path
 
 
-def stand_in(task, report):
-    """Knows the first case and breaks on the second."""
+def mock_diagnosis(task, report):
+    """Mock diagnosis: correct for the first case, an error for the second."""
     if task.name == "case-0002":
         return Outcome(task.name, 1, 0.1, message="no such column")
     task.out.mkdir(exist_ok=True)
@@ -39,10 +39,10 @@ def stand_in(task, report):
     return Outcome(task.name, 0, 0.1, found)
 
 
-def test_diagnoses_once_and_scores(folder):
+def test_cases_are_diagnosed_once_and_scored(folder):
     seen, again = [], []
-    prove.diagnose_all(folder, progress=lambda n, of: seen.append((n, of)), work=stand_in)
-    prove.diagnose_all(folder, progress=lambda n, of: again.append((n, of)), work=stand_in)
+    prove.diagnose_all(folder, progress=lambda n, of: seen.append((n, of)), work=mock_diagnosis)
+    prove.diagnose_all(folder, progress=lambda n, of: again.append((n, of)), work=mock_diagnosis)
     assert seen == [(1, 2), (2, 2)]
     assert again == []
     result = prove.score_all(folder)
@@ -54,29 +54,29 @@ def test_diagnoses_once_and_scores(folder):
 
 
 def endless(task, report):
-    """Never done."""
+    """Mock diagnosis that never ends."""
     Event().wait()
 
 
-def test_a_case_that_takes_too_long_is_written_down_with_what_would_help(folder):
+def test_timed_out_case_is_recorded_with_the_limit(folder):
     prove.diagnose_all(folder, work=endless, limit=0.2)
     failed = (folder / "case-0001" / "diagnosis" / prove.FAILED).read_text()
     assert "not done within --limit 0.2 s" in failed
 
 
-def test_a_broken_seal_stops_the_scoring(folder):
+def test_broken_seal_prevents_scoring(folder):
     (folder / seal.ANSWERS).write_text((folder / seal.ANSWERS).read_text().replace("drive.lag", "drive.offset"))
     with pytest.raises(UserError, match="not what was sealed"):
         prove.score_all(folder)
 
 
-def test_other_cases_in_the_folder_are_refused(folder):
+def test_folder_with_cases_of_another_seed_is_refused(folder):
     assert len(prove.prepare(folder, 2, 1, ("axis",), 1, False, None)) == 64
     with pytest.raises(UserError, match="name another --out"):
         prove.prepare(folder, 2, 7, ("axis",), 1, False, None)
 
 
-def test_cases_of_machines_are_told_from_those_of_the_plants(folder):
+def test_machine_cases_and_plant_cases_are_not_mixed(folder):
     sealed = seal.open_seal(folder)
     seal.close_seal(folder, sealed | {"mix": "proof of machines, seed 1", "format": 2})
     assert len(prove.prepare(folder, 2, 1, ("belt",), 1, False, None, machines=True)) == 64
@@ -89,7 +89,7 @@ def test_cases_of_machines_are_told_from_those_of_the_plants(folder):
     [(["--machines", "--plants", "axis"], "--topologies"), (["--topologies", "belt"], "needs --machines"),
      (["--machines", "--topologies", "boat"], "'boat' is not one of belt")],
 )  # fmt: skip
-def test_options_that_do_not_go_together_are_refused(tmp_path, options, said):
+def test_incompatible_options_are_refused(tmp_path, options, said):
     from rtctl.cli.prove import app
 
     answer = CliRunner().invoke(app, [*options, "--count", "1", "--out", str(tmp_path / "new"), "--generate-only"])
@@ -97,7 +97,7 @@ def test_options_that_do_not_go_together_are_refused(tmp_path, options, said):
     assert said in str(answer.exception)
 
 
-def test_command(folder):
+def test_command_prints_scores_or_hash_as_json(folder):
     from rtctl.cli.prove import app
 
     answer = CliRunner().invoke(app, ["--count", "2", "--seed", "1", "--out", str(folder), "--json"])

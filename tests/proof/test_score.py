@@ -1,4 +1,4 @@
-"""The scorer: hand-made diagnoses, and agreement with the scorer that came with the practice cases."""
+"""Scorer: hand-made diagnoses, and agreement with the scorer of the practice cases."""
 
 import importlib.util
 import json
@@ -30,7 +30,7 @@ def named(*names, confidence=0.9, node="motor1"):
     }  # fmt: skip
 
 
-def test_counts_of_each_kind():
+def test_scores_of_each_kind_of_case():
     answers = {
         "a": case("single", ["friction.coulomb"]), "b": case("single", ["drive.lag"], 0.3),
         "c": case("null", size=None),
@@ -57,7 +57,7 @@ def test_counts_of_each_kind():
     assert "friction.coulomb" in report.markdown(R)
 
 
-def test_intervals_are_held_against_the_truth():
+def test_interval_coverage_counts_the_true_values():
     d = named("friction.coulomb")
     d["parameters"] = {"J": {"value": 1.9, "ci90": [1.8, 2.1]}}
     d["effects"][0]["parameters"] = {"F": {"value": 2.0, "ci90": [1.5, 2.5]}}
@@ -65,7 +65,7 @@ def test_intervals_are_held_against_the_truth():
     assert R["intervals"] == {"base": {"held": 1, "of": 1}, "effects": {"held": 0, "of": 1}}
 
 
-def test_reliability_of_a_tool_that_knows_its_odds():
+def test_calibrated_confidences_have_a_small_calibration_error():
     rng = np.random.default_rng(1)
     c = rng.random(20000)
     right = (rng.random(20000) < c).astype(float)
@@ -75,13 +75,13 @@ def test_reliability_of_a_tool_that_knows_its_odds():
     assert sure["ece"] == pytest.approx(0.5, abs=0.02)
 
 
-def test_a_diagnosis_that_is_not_one_counts_as_missing():
+def test_invalid_diagnosis_counts_as_missing():
     R = score({"a": case("single", ["drive.lag"]), "b": case("null", size=None)}, {"a": {"verdict": "maybe"}})
     assert R["missing"] == 2
     assert R["single"]["top1"] == 0.0
 
 
-def test_wilson():
+def test_wilson_interval():
     low, high = wilson(0, 59)
     assert low == 0
     assert 0.055 < high < 0.065
@@ -90,13 +90,13 @@ def test_wilson():
 
 @pytest.mark.skipif(not (SHARED / "score.py").exists(), reason="no practice cases here")
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_agrees_with_the_scorer_of_the_practice_cases(seed):
+def test_scores_agree_with_the_scorer_of_the_practice_cases(seed):
     spec = importlib.util.spec_from_file_location("practice_score", SHARED / "score.py")
     theirs = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(theirs)
     answers = json.loads((SHARED / "practice" / "answers.json").read_text())["cases"]
     rng = np.random.default_rng(seed)
-    diagnoses = {name: _fake(rng, a) for name, a in answers.items() if rng.random() < 0.9}
+    diagnoses = {name: _random_diagnosis(rng, a) for name, a in answers.items() if rng.random() < 0.9}
     want = theirs.score(answers, diagnoses.get)[0]
     found = score(answers, diagnoses)
     for key in (
@@ -117,8 +117,8 @@ def test_agrees_with_the_scorer_of_the_practice_cases(seed):
     assert found.get("brier") == want.get("brier")
 
 
-def _fake(rng, a):
-    """A diagnosis that is right, half right or wrong at random."""
+def _random_diagnosis(rng, a):
+    """Random diagnosis: correct, partly correct or wrong."""
     true = [{"name": e["name"], "node": e["node"], "confidence": float(rng.random())} for e in a["effects"]]
     other = [{"name": "drive.lag", "node": "drive1", "confidence": float(rng.random())}]
     effects = [[], true, other, true[:1] + other, other + true][rng.integers(5)]

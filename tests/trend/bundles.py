@@ -1,4 +1,4 @@
-"""Bundles of a carriage on a rail, driven by a force that nobody controls: friction and mass as a test wants them."""
+"""Bundles of a carriage on a rail, driven by a force in open loop, with the friction and mass of the test."""
 
 import json
 from datetime import UTC, datetime, timedelta
@@ -25,7 +25,7 @@ def bundle(
     dated: bool = True,
     row_group: int = 65_536,
 ) -> Path:
-    """A recording of the carriage under random force of some hertz; `number` is its seed, and its day."""
+    """Recording of the carriage under a random force of a few hertz; `number` is the seed and the day."""
     rng = np.random.default_rng(number)
     n, dt = int(seconds * rate), 1.0 / rate
     smooth = np.exp(-dt / 0.05)
@@ -62,7 +62,7 @@ def bundle(
 
 
 def worn(folder: Path, count: int = 24, since: int = 14, viscous: float = 1.25 * VISCOUS) -> Path:
-    """A folder of recordings, day by day, whose friction is larger from recording `since` on."""
+    """Folder of daily recordings with viscous friction `viscous` from recording `since` on."""
     for number in range(count):
         bundle(folder / f"day-{number:03d}", number, 3.0, viscous if number >= since else VISCOUS)
     return folder

@@ -1,4 +1,4 @@
-"""One trend of recordings whose friction changes, fitted once for all tests of this folder."""
+"""Recordings with a friction change, fitted once for all tests of this folder."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,6 +17,6 @@ def recordings(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def fitted(recordings: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, dict[str, Any]]]:
-    """Folder of the results, and the object of --json."""
+    """Folder of the results and the object of `--json`."""
     folder = tmp_path_factory.mktemp("trend") / "out"
     yield folder, trend.run([recordings], folder)

@@ -1,4 +1,4 @@
-"""Pieces of recordings: windows of long ones, read without the rest."""
+"""Pieces of recordings: windows of a long recording, read without the other row groups."""
 
 from pathlib import Path
 
@@ -12,7 +12,9 @@ from rtctl.trend.pieces import bundles_in, pieces_of, read
 from tests.trend.bundles import BEGAN, bundle
 
 
-def test_a_long_recording_is_read_window_by_window(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_windows_of_a_long_recording_read_only_their_row_groups(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     folder = bundle(tmp_path / "long", 3, 20.0, row_group=1000)
     pieces = pieces_of(folder, 6.0)
     assert [piece.rows for piece in pieces] == [3334, 3334, 3332]
@@ -25,24 +27,24 @@ def test_a_long_recording_is_read_window_by_window(tmp_path: Path, monkeypatch: 
     assert np.array_equal(x, load_bundle(folder).columns["x"])
 
 
-def test_a_short_rest_belongs_to_the_window_before(tmp_path: Path) -> None:
+def test_short_remainder_joins_the_last_window(tmp_path: Path) -> None:
     folder = bundle(tmp_path / "one", 0, 4.0)
     assert len(pieces_of(folder, 3.0)) == 1 and len(pieces_of(folder, 2.0)) == 2
 
 
-def test_the_machine_is_the_group_the_config_or_the_folder(tmp_path: Path) -> None:
+def test_machine_name_is_the_group_or_the_folder(tmp_path: Path) -> None:
     assert pieces_of(bundle(tmp_path / "bench" / "a", 0))[0].machine == "rail"
     assert pieces_of(bundle(tmp_path / "bench" / "b", 0, group=""))[0].machine == "bench"
 
 
-def test_a_changed_recording_has_another_stamp(tmp_path: Path) -> None:
+def test_changed_recording_has_a_new_stamp(tmp_path: Path) -> None:
     folder = bundle(tmp_path / "a", 0)
     before = pieces_of(folder)[0].stamp
     (folder / "case.json").write_text((folder / "case.json").read_text() + "\n")
     assert pieces_of(folder)[0].stamp != before
 
 
-def test_bundles_at_any_depth_and_what_is_none(tmp_path: Path) -> None:
+def test_bundles_are_found_at_any_depth_and_missing_bundles_are_refused(tmp_path: Path) -> None:
     one, two = bundle(tmp_path / "x" / "b", 0), bundle(tmp_path / "x" / "deep" / "a", 1)
     assert bundles_in([tmp_path / "x", one]) == [one, two]
     with pytest.raises(UserError, match="holds no bundle"):

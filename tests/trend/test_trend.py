@@ -1,4 +1,4 @@
-"""The whole way: recordings to table, changes and page; the same whoever computes it."""
+"""The pipeline from recordings to table, changes and page, in processes and on Dask workers."""
 
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ from tests.trend.bundles import VISCOUS, bundle
 Fitted = tuple[Path, dict[str, Any]]
 
 
-def test_the_change_is_found_with_its_day_and_size(fitted: Fitted) -> None:
+def test_friction_change_is_found_with_its_day_and_size(fitted: Fitted) -> None:
     change = fitted[1]["changes"][0]
     assert fitted[1]["alarms"] == 1 and len(fitted[1]["changes"]) == 1
     assert (change["number"], change["kind"], change["alarm"]) == ("bodies.carriage.viscous", "shift", True)
@@ -22,25 +22,25 @@ def test_the_change_is_found_with_its_day_and_size(fitted: Fitted) -> None:
     assert change["probability"] > 0.99
 
 
-def test_every_estimate_is_in_the_table(fitted: Fitted) -> None:
+def test_table_holds_every_estimate(fitted: Fitted) -> None:
     rows = [row for row in table.read(fitted[0]) if row["name"] == "bodies.carriage.viscous"]
     assert len(rows) == 16 and all(row["low"] <= row["value"] <= row["high"] for row in rows)
     assert rows[0]["value"] == pytest.approx(VISCOUS, rel=0.01) and rows[0]["unit"] == "N*s/m"
     assert rows[-1]["value"] == pytest.approx(1.25 * VISCOUS, rel=0.01) and rows[-1]["nominal"] == VISCOUS
 
 
-def test_the_page_says_what_changed(fitted: Fitted) -> None:
+def test_page_names_the_changed_parameter(fitted: Fitted) -> None:
     text = (fitted[0] / trend.PAGE).read_text("utf-8")
     assert "Changed: rail." in text and "bodies.carriage.viscous" in text and "<svg" in text and "+25 %" in text
 
 
-def test_only_new_recordings_are_fitted(fitted: Fitted, recordings: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_second_run_fits_only_new_recordings(fitted: Fitted, recordings: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(trend, "estimates", lambda pieces: pytest.fail("fitted again"))
     again = trend.run([recordings], fitted[0])
     assert again["fitted"] == 0 and again["changes"] == fitted[1]["changes"]
 
 
-def test_processes_and_workers_of_dask_give_the_same(recordings: Path, tmp_path: Path) -> None:
+def test_dask_workers_and_local_processes_give_equal_estimates(recordings: Path, tmp_path: Path) -> None:
     distributed = pytest.importorskip("distributed", reason="Dask (distributed) is not installed")
     pieces = [piece for day in range(3) for piece in pieces_of(recordings / f"day-{day:03d}")]
     here = {
@@ -58,7 +58,7 @@ def test_processes_and_workers_of_dask_give_the_same(recordings: Path, tmp_path:
             list(trend.computed(away, 1, cluster.scheduler_address))
 
 
-def test_a_recording_that_cannot_be_read_is_told_and_the_others_count(recordings: Path, tmp_path: Path) -> None:
+def test_unreadable_recording_is_reported_and_the_others_are_fitted(recordings: Path, tmp_path: Path) -> None:
     bad = bundle(tmp_path / "mixed" / "still", 0)
     (bad / "recording.parquet").write_bytes(b"no parquet")
     bundle(tmp_path / "mixed" / "good", 1)
@@ -66,7 +66,7 @@ def test_a_recording_that_cannot_be_read_is_told_and_the_others_count(recordings
     assert [Path(e["folder"]).name for e in found["errors"]] == ["still"] and found["looked_at"] == 3
 
 
-def test_nothing_to_fit_is_no_answer(tmp_path: Path) -> None:
+def test_trend_without_a_readable_recording_has_no_answer(tmp_path: Path) -> None:
     bad = bundle(tmp_path / "mixed" / "still", 0)
     (bad / "recording.parquet").write_bytes(b"no parquet")
     with pytest.raises(NoAnswer, match="none of 1 recordings"):

@@ -1,4 +1,4 @@
-"""A shift of the reel unit on virtual time, and the band that is learned from it: made once for all tests here."""
+"""A shift of the reel unit on virtual time and the learned band, made once for all tests of this folder."""
 
 from typing import Any, NamedTuple
 
@@ -10,7 +10,7 @@ from rtctl.watch.band import Band
 from rtctl.watch.monitor import Monitor
 from rtctl.watch.rehearsal import Moves, Shift, usual
 
-LEARNED = 150.0  # s in motion: enough for a test of what is noticed, not for a rate of false alarms
+LEARNED = 150.0  # s in motion: enough for detection tests, too short for a false-alarm rate
 
 
 class Rehearsed(NamedTuple):
@@ -18,8 +18,8 @@ class Rehearsed(NamedTuple):
     moves: Moves
     case: dict[str, Any]
     band: Band
-    rows: np.ndarray  # those from which it was learned
-    after: np.ndarray  # 120 s that follow, as healthy
+    rows: np.ndarray  # rows of the learning phase
+    after: np.ndarray  # the next 120 s of the healthy machine
 
 
 @pytest.fixture(scope="session")

@@ -1,4 +1,4 @@
-"""A capture from before the alarm, its diagnosis in another process, and words where one of them fails."""
+"""Capture from before the alarm, diagnosis in another process, and messages of failures."""
 
 import json
 import os
@@ -13,7 +13,7 @@ from rtctl.watch.background import ALL, BEFORE, Background, lowest
 
 
 class Fake:
-    """A daemon that captures at once."""
+    """A daemon whose captures finish immediately."""
 
     def __init__(self, done=True, **beside):
         self.done, self.beside, self.asked = done, beside, []
@@ -36,7 +36,7 @@ def finish(made):
     return made.look()
 
 
-def test_capture_and_diagnosis(tmp_path, monkeypatch):
+def test_capture_starts_before_the_alarm_and_is_diagnosed_at_low_priority(tmp_path, monkeypatch):
     found = {"headline": "Motor 2 sticks.", "effects": [{"check": "Look at its bearing."}]}
     program = (
         "import sys, pathlib, os; d = pathlib.Path(sys.argv[1]) / 'diagnosis'; d.mkdir(parents=True)\n"
@@ -55,7 +55,7 @@ def test_capture_and_diagnosis(tmp_path, monkeypatch):
     assert (tmp_path / "alarm" / "diagnosis" / "nice").read_text() == "19"
 
 
-def test_a_diagnosis_that_fails_is_told(tmp_path, monkeypatch):
+def test_failed_diagnosis_is_reported(tmp_path, monkeypatch):
     diagnoses(tmp_path, monkeypatch, "import sys; sys.exit('rtctl: nothing moved')")
     made = Background(Fake(), tmp_path / "alarm")
     made.begin()
@@ -63,7 +63,7 @@ def test_a_diagnosis_that_fails_is_told(tmp_path, monkeypatch):
     assert made.done
 
 
-def test_a_capture_that_cannot_begin_or_fails_is_told(tmp_path):
+def test_refused_or_failed_capture_is_reported(tmp_path):
     class Refuses:
         def call(self, op, **_):
             raise UserError("8 captures are running")
@@ -80,7 +80,7 @@ def test_a_capture_that_cannot_begin_or_fails_is_told(tmp_path):
 
 
 @pytest.mark.skipif(len(os.sched_getaffinity(0)) < 2, reason="one processor")
-def test_a_process_off_the_processor_of_the_loop():
+def test_background_process_avoids_the_processor_of_the_control_loop():
     cpu = max(os.sched_getaffinity(0))
     said = subprocess.run(
         [sys.executable, "-c", "import os; print(os.nice(0), sorted(os.sched_getaffinity(0)))"],

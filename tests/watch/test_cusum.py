@@ -1,4 +1,4 @@
-"""Sums that rise with a shift, fall back without one, and keep the rate of false alarms that they promise."""
+"""CUSUM: sums rise with a shift and keep the stated false-alarm rate."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ import pytest
 from rtctl.watch.cusum import BOUND, DAY, DRIFT, HIGHEST, Sums, Thresholds, bounded, exponent, thresholds
 
 
-def test_exponent_of_normal_scores():
+def test_exponent_of_normal_scores_is_twice_the_drift():
     """For independent normal scores theta is twice the drift (Siegmund 1985, 2.2)."""
     x = np.random.default_rng(0).standard_normal(200_000)
     assert exponent(x, np.ones(len(x))) == pytest.approx(2 * DRIFT, rel=0.05)
@@ -18,14 +18,14 @@ def test_exponent_is_smaller_for_correlated_scores():
     assert exponent(x, np.ones(len(x))) < 0.5 * 2 * DRIFT
 
 
-def test_scores_that_do_not_fall_have_no_threshold_that_is_ever_reached():
+def test_scores_without_negative_drift_never_reach_the_threshold():
     x = np.full((100, 1), 1.0)
     limits = thresholds(x, np.ones(100), 1.0, 1.0)
     sums = Sums(limits)
     assert all(sums.step(np.array([1.0]), 1.0) is None for _ in range(1000))
 
 
-def test_false_alarms_of_normal_scores_are_no_more_than_stated():
+def test_false_alarm_rate_of_normal_scores_is_within_the_stated_rate():
     rng = np.random.default_rng(2)
     limits = thresholds(rng.standard_normal((2000, 8)), np.ones(2000), 1.0, per_day=1.0)
     sums, alarms = Sums(limits), 0
@@ -36,7 +36,7 @@ def test_false_alarms_of_normal_scores_are_no_more_than_stated():
     assert alarms <= 2
 
 
-def test_one_window_makes_no_alarm_and_a_shift_does():
+def test_single_outlier_raises_no_alarm_and_a_shift_does():
     sums = Sums(Thresholds(np.array([12.0]), 1.0))
     assert sums.step(np.array([1e9]), 1.0) is None
     assert sums.value[0] == pytest.approx(HIGHEST - DRIFT)
@@ -46,14 +46,14 @@ def test_one_window_makes_no_alarm_and_a_shift_does():
     assert sums.rising[0] == steps + 1
 
 
-def test_a_repeated_window_counts_less():
+def test_window_weight_scales_the_cusum_increment():
     whole, part = (Sums(Thresholds(np.array([12.0]), 1.0)) for _ in range(2))
     whole.step(np.array([2.0]), 1.0)
     part.step(np.array([2.0]), 0.1)
     assert part.value[0] == pytest.approx(0.1 * whole.value[0])
 
 
-def test_scores_are_bounded_evenly_on_both_sides():
+def test_score_limiter_is_monotone_and_symmetric():
     z = np.array([-1e9, -BOUND, -1.0, 0.0, 1.0, BOUND, 2 * BOUND, 1e9])
     found = bounded(z)
     np.testing.assert_allclose(found[1:6], z[1:6])

@@ -1,4 +1,4 @@
-"""A band in a file is the band that was learned, and one of another machine is refused."""
+"""Band files: the loaded band equals the learned band; a band of another machine is refused."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ from rtctl.config.errors import UserError
 from rtctl.watch.kept import identity, load_band, save_band
 
 
-def test_a_band_is_read_as_it_was_written(rehearsed, tmp_path):
+def test_band_file_round_trip(rehearsed, tmp_path):
     path = tmp_path / "band.json"
     save_band(path, rehearsed.band, "a")
     found = load_band(path, "a")
@@ -20,7 +20,7 @@ def test_a_band_is_read_as_it_was_written(rehearsed, tmp_path):
             np.testing.assert_array_equal(getattr(found, name), value)
 
 
-def test_a_band_of_another_model_is_refused(rehearsed, tmp_path):
+def test_band_of_another_model_is_refused(rehearsed, tmp_path):
     path = tmp_path / "band.json"
     save_band(path, rehearsed.band, identity(rehearsed.case, None))
     other = {**rehearsed.case, "parameters": {"R1": 1.0}}
@@ -28,12 +28,12 @@ def test_a_band_of_another_model_is_refused(rehearsed, tmp_path):
         load_band(path, identity(other, None))
 
 
-def test_the_law_is_no_part_of_the_model(rehearsed):
+def test_model_identity_does_not_depend_on_the_law(rehearsed):
     config = {**rehearsed.case["config"], "law": {"kind": "another"}}
     assert identity({**rehearsed.case, "config": config}, None) == identity(rehearsed.case, None)
 
 
-def test_a_file_that_is_no_band_is_told(tmp_path):
+def test_file_without_a_band_is_refused(tmp_path):
     path = tmp_path / "band.json"
     path.write_text('{"format": 7, "band": {}}')
     with pytest.raises(UserError, match="is no band of `rtctl watch`"):

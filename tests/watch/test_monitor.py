@@ -1,4 +1,4 @@
-"""A monitor leaves a healthy machine in peace, notices an effect that begins in mid-run, and tells faults as faults."""
+"""Monitor: no alarm on a healthy machine, alarm on a new effect, notes on faults of the row stream."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ def monitor(rehearsed):
     return Monitor(rehearsed.case, band=rehearsed.band)
 
 
-def test_it_learns_and_a_healthy_machine_is_left_in_peace(rehearsed, monitor):
+def test_healthy_machine_raises_no_alarm(rehearsed, monitor):
     assert monitor.state == "waiting"
     assert monitor.feed(rehearsed.after) is None
     assert monitor.state == "watching"
@@ -24,7 +24,7 @@ def test_it_learns_and_a_healthy_machine_is_left_in_peace(rehearsed, monitor):
     assert monitor.notes == []
 
 
-def test_pieces_of_any_size_are_judged_alike(rehearsed):
+def test_monitor_does_not_depend_on_the_piece_size(rehearsed):
     one, many = (Monitor(rehearsed.case, band=rehearsed.band) for _ in range(2))
     one.feed(rehearsed.after)
     at = 0
@@ -35,7 +35,7 @@ def test_pieces_of_any_size_are_judged_alike(rehearsed):
     np.testing.assert_allclose(many.sums.value, one.sums.value, atol=1e-9)
 
 
-def test_a_drive_that_begins_to_stick_is_noticed_within_half_a_minute_of_motion(rehearsed, monitor):
+def test_new_stick_slip_of_a_drive_is_detected_within_30_s_of_motion(rehearsed, monitor):
     shift, rng = Shift(rehearsed.config), np.random.default_rng(5)
     assert monitor.feed(shift.play(rehearsed.moves, rng, 30.0)) is None
     other = shift.become(set_path(rehearsed.config, "plant.physics.0", STICKS))
@@ -49,7 +49,7 @@ def test_a_drive_that_begins_to_stick_is_noticed_within_half_a_minute_of_motion(
     assert " mNm" in alarm.words or " uNm" in alarm.words or "scatters" in alarm.words
 
 
-def test_lost_rows_are_noted_and_are_no_alarm(rehearsed, monitor):
+def test_lost_rows_give_a_note_and_no_alarm(rehearsed, monitor):
     rows = rehearsed.after
     assert monitor.feed(rows[:20_000]) is None
     assert monitor.feed(rows[21_000:40_000]) is None
@@ -59,21 +59,21 @@ def test_lost_rows_are_noted_and_are_no_alarm(rehearsed, monitor):
     assert monitor.lost == 6000
 
 
-def test_a_clock_that_jumps_is_noted_and_is_no_alarm(rehearsed, monitor):
+def test_clock_jump_gives_a_note_and_no_alarm(rehearsed, monitor):
     rows = rehearsed.after.copy()
     rows["t"][30_000:] += 3600.0
     assert monitor.feed(rows) is None
     assert [note for note in monitor.notes if "clock of the rows jumped by +3.6e+03 s" in note]
 
 
-def test_a_machine_that_is_started_anew_is_noted_and_is_no_alarm(rehearsed, monitor):
+def test_machine_restart_gives_a_note_and_no_alarm(rehearsed, monitor):
     assert monitor.feed(rehearsed.after[:30_000]) is None
     again = Shift(rehearsed.config).play(rehearsed.moves, np.random.default_rng(6), 30.0)
     assert monitor.feed(again) is None
     assert [note for note in monitor.notes if "started anew" in note]
 
 
-def test_late_rows_are_not_judged(rehearsed, monitor):
+def test_windows_with_late_rows_are_not_scored(rehearsed, monitor):
     rows = rehearsed.after.copy()
     late = np.random.default_rng(7).random(len(rows)) < 0.01
     rows["t"][late] += 0.5 / 500.0
@@ -85,16 +85,16 @@ def test_late_rows_are_not_judged(rehearsed, monitor):
     assert "an alarm may come late, or not at all" in told[0]
 
 
-def test_a_model_that_runs_away_is_no_judge(rehearsed, monitor):
+def test_divergent_model_raises_no_alarm(rehearsed, monitor):
     monitor.feed(rehearsed.after[:10_000])
-    monitor.observer._spread[:] = 1e-9  # whatever the model shows is far off
+    monitor.observer._spread[:] = 1e-9  # every model error exceeds the divergence limit
     alarms = [monitor.feed(rehearsed.after[k : k + 2000]) for k in range(10_000, 60_000, 2000)]
     assert alarms == [None] * len(alarms)
     assert monitor.state == "astray"
     assert [note for note in monitor.notes if "cannot judge this machine" in note]
 
 
-def test_a_machine_at_rest_is_waited_for(rehearsed):
+def test_machine_at_rest_keeps_the_monitor_waiting(rehearsed):
     monitor = Monitor(rehearsed.case)
     rows = Shift(rehearsed.config).run(30 * 500)
     assert monitor.feed(rows) is None
@@ -102,8 +102,8 @@ def test_a_machine_at_rest_is_waited_for(rehearsed):
     assert monitor.learned == 0.0
 
 
-def test_a_model_in_place_of_the_config_is_what_the_machine_is_compared_with(rehearsed, tmp_path):
-    """A reel that drags: with it in the model the machine is as near as a healthy one, without it is not."""
+def test_model_file_replaces_the_config_as_reference(rehearsed, tmp_path):
+    """Dry friction of a reel in the model file lowers the slow residual."""
     drags = set_path(rehearsed.config, "plant.physics.0", {"term": "friction.coulomb", "node": "motor1", "F_C": 3e-3})
     shift = Shift(rehearsed.config).become(drags)
     rows = shift.play(rehearsed.moves, np.random.default_rng(5), 120.0)

@@ -1,4 +1,4 @@
-"""The observer is the simulation of the diagnosis, carried on from chunk to chunk."""
+"""The observer equals the simulation of the diagnosis, continued from chunk to chunk."""
 
 from pathlib import Path
 
@@ -29,18 +29,18 @@ def fed(record, sizes):
     return [np.concatenate(part) for part in zip(*parts, strict=True)]
 
 
-def test_one_chunk_is_the_simulation_of_the_diagnosis(record):
+def test_observer_of_one_chunk_equals_the_simulation_of_the_diagnosis(record):
     e, push = fed(record, [15_000])
     simulator = Simulator(record)
     out, told = simulator.everything(nominal(record.case))
     name = simulator.main
-    late = slice(2, None)  # where the recording begins, the diagnosis has no command before its first row
+    late = slice(2, None)  # the diagnosis has no command before the first row
     np.testing.assert_allclose(e[late, 0], record.y[name][late] - out[late, simulator.column(name)], atol=1e-9)
     np.testing.assert_allclose(push[late], told[late], atol=1e-9)
 
 
-def test_chunks_of_any_size_give_the_same(record):
+def test_observer_does_not_depend_on_the_chunk_size(record):
     whole, pieces = fed(record, [15_000]), fed(record, [1, 2, 997, 4000, 10_000])
     np.testing.assert_allclose(pieces[0], whole[0], atol=1e-4 * record.grain[record.main])
-    off = np.sqrt(np.mean((pieces[1] - whole[1]) ** 2))  # at the first row of a chunk the error has no rate
+    off = np.sqrt(np.mean((pieces[1] - whole[1]) ** 2))  # the first row of a chunk has no error rate
     assert off < 0.1 * np.sqrt(np.mean(whole[1] ** 2))

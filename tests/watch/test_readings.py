@@ -1,4 +1,4 @@
-"""Rows in SI, as the diagnosis reads them: with counters that wrap, chunk after chunk."""
+"""Rows in SI units as in the diagnosis: counters are unwrapped across chunks."""
 
 from pathlib import Path
 
@@ -18,7 +18,7 @@ def first(rehearsed):
     return columns, of_bundle(Bundle(columns, rehearsed.case, Path("x"), {}))
 
 
-def test_chunks_are_those_of_the_record(first):
+def test_readings_in_chunks_equal_the_record(first):
     columns, record = first
     readings = Readings(record, columns, False)
     parts = [readings.take({n: v[k : k + 777] for n, v in columns.items()}) for k in range(0, 10_000, 777)]
@@ -26,12 +26,12 @@ def test_chunks_are_those_of_the_record(first):
     np.testing.assert_allclose(np.concatenate([p[0] for p in parts]), record.u)
 
 
-def test_a_counter_that_wraps_goes_on(first):
+def test_wrapping_counter_is_unwrapped_across_chunks(first):
     columns, record = first
     readings = Readings(record, columns, False)
     name = record.case.machine.sensors[readings.sensors[0]].column
     counts = np.asarray(columns[name]).astype(np.int64) + 2**23 - 100
-    wrapped = (counts + 2**23) % 2**24 - 2**23  # as a counter of 24 bits shows them
+    wrapped = (counts + 2**23) % 2**24 - 2**23  # reading of a 24-bit counter
     assert np.ptp(wrapped) > 2**22
     parts = [
         readings.take({**{n: v[k : k + 500] for n, v in columns.items()}, name: wrapped[k : k + 500]})[1][:, 0]
@@ -42,7 +42,7 @@ def test_a_counter_that_wraps_goes_on(first):
     np.testing.assert_allclose(y - y[0], record.y[readings.sensors[0]] - record.y[readings.sensors[0]][0], atol=1e-9)
 
 
-def test_columns_that_are_not_those_of_the_record_are_refused(first):
+def test_columns_that_differ_from_the_record_are_refused(first):
     columns, record = first
     with pytest.raises(UserError, match="row by row"):
         Readings(record, {**columns, "u1": columns["u1"] * 1.01}, False)

@@ -1,4 +1,4 @@
-"""A recording is judged in pieces, as rows that come are."""
+"""A recording is scored in pieces, like live rows."""
 
 import json
 
@@ -22,14 +22,14 @@ def bundle(rehearsed, tmp_path):
     return folder
 
 
-def test_rows_come_in_pieces_and_none_is_missing(rehearsed, bundle):
+def test_recording_is_read_completely_in_bounded_pieces(rehearsed, bundle):
     pieces = list(rows_of(bundle))
     assert max(len(piece) for piece in pieces) <= PIECE
     assert sum(len(piece) for piece in pieces) == len(rehearsed.after)
     assert pieces[0].dtype.names == rehearsed.after.dtype.names
 
 
-def test_a_healthy_recording_makes_no_alarm(rehearsed, bundle, tmp_path):
+def test_healthy_recording_raises_no_alarm(rehearsed, bundle, tmp_path):
     band, said = tmp_path / "band.json", []
     save_band(band, rehearsed.band, identity(rehearsed.case, None))
     assert watch_bundle(bundle, said.append, band=band) == []
@@ -38,7 +38,7 @@ def test_a_healthy_recording_makes_no_alarm(rehearsed, bundle, tmp_path):
     assert said[-1].startswith(f"{live.judged} windows judged")
 
 
-def test_a_recording_that_is_too_short_to_learn_from(bundle, tmp_path):
+def test_recording_too_short_for_learning_is_refused(bundle, tmp_path):
     with pytest.raises(NoAnswer, match="ends before the band is learned"):
         watch_bundle(bundle, lambda _: None, seconds=3600.0)
     with pytest.raises(UserError, match="nowhere"):

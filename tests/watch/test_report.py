@@ -1,4 +1,4 @@
-"""A report is one that the command socket takes, with lanes of the newest windows."""
+"""The report is a valid request of the command socket, with lanes of the newest windows."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from rtctl.watch.monitor import Monitor
 from rtctl.watch.report import LANE_SECONDS, report
 
 
-def test_a_report_while_it_waits_and_while_it_watches(rehearsed):
+def test_report_of_a_waiting_and_of_a_watching_monitor(rehearsed):
     monitor = Monitor(rehearsed.case, band=rehearsed.band)
     waits = report(monitor, [], None)
     assert waits == {"state": "waiting", "learned": 1.0}

@@ -1,4 +1,4 @@
-"""Rows of a machine that stops, goes, and comes back."""
+"""Row source of a machine that stalls, disappears and restarts."""
 
 from types import SimpleNamespace
 
@@ -13,7 +13,7 @@ ROW = np.dtype([("tick", np.int64)])
 
 
 class Ring:
-    """A ring that gives what a test puts into it."""
+    """A ring that holds `waiting` rows."""
 
     waiting = 0
 
@@ -26,7 +26,7 @@ class Ring:
 
 
 class Daemon:
-    """Answers while it is there."""
+    """A daemon that answers while `there` is true."""
 
     def __init__(self):
         self.pid, self.there = 1, True
@@ -50,14 +50,14 @@ def made(monkeypatch, tmp_path):
     return found, daemon, now
 
 
-def test_rows_and_case(made):
+def test_source_gives_rows_and_case(made):
     found, _, _ = made
     assert found.case == {"sample_rate": 500.0}
     Ring.waiting = 7
     assert len(found.take().rows) == 7
 
 
-def test_rows_that_stop_are_missed_once(made):
+def test_stalled_rows_are_noted_once(made):
     found, _, now = made
     now.at += STILL + 0.1
     assert "no rows for 3 s" in found.take().notes[0]
@@ -67,20 +67,20 @@ def test_rows_that_stop_are_missed_once(made):
     assert found.take().notes == ()
 
 
-def test_a_machine_that_goes_and_comes_back(made):
+def test_restarted_daemon_is_a_new_machine(made):
     found, daemon, now = made
     daemon.there = False
     now.at += STILL + 0.1
     gone = found.take()
     assert gone.rows is None and "has gone" in gone.notes[0]
     daemon.there, daemon.pid = True, 2
-    assert found.take().rows is None  # it looks once a second
+    assert found.take().rows is None  # the source looks for a daemon once a second
     now.at += LOOK + 0.1
     back = found.take()
     assert back.begun and "started anew, pid 2" in back.notes[0]
 
 
-def test_a_ring_out_of_reach_is_told(made, monkeypatch):
+def test_inaccessible_ring_is_reported(made, monkeypatch):
     found, _, _ = made
 
     def refuses(_):
@@ -91,7 +91,7 @@ def test_a_ring_out_of_reach_is_told(made, monkeypatch):
         found.begin()
 
 
-def test_a_daemon_that_was_busy_is_no_other_machine(made):
+def test_daemon_that_was_busy_is_not_a_new_machine(made):
     found, daemon, now = made
     daemon.there = False
     now.at += STILL + 0.1

@@ -5,7 +5,7 @@ from rtctl.case.start import START
 from rtctl.diagnose.evidence.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Effect
 
 
-def test_nothing():
+def test_nominal_machine_has_the_verdict_nothing():
     d = nothing()
     assert d.verdict == NOTHING
     assert not d.effects
@@ -13,11 +13,11 @@ def test_nothing():
     assert d.headline.startswith("Nothing is missing")
     assert d.heldout.before < 2 * d.heldout.floor
     for path, v in d.parameters.items():
-        nominal = 0.0 if path == START else d.record.case.values[path]  # kept as its exponential
+        nominal = 0.0 if path == START else d.record.case.values[path]  # the case stores its exponential
         assert v.low <= nominal <= v.high, path
 
 
-def test_dry_friction_of_the_carriage():
+def test_dry_friction_of_the_carriage_is_named_with_its_interval():
     d = named()
     assert d.verdict == NAMED
     assert [(e.name, e.node) for e in d.effects] == [("friction.coulomb", "carriage")]
@@ -28,7 +28,7 @@ def test_dry_friction_of_the_carriage():
     assert d.heldout.after < 0.2 * d.heldout.before
 
 
-def test_a_force_without_a_name():
+def test_force_without_a_matching_law_is_unnamed():
     d = unnamed()
     assert d.verdict == UNNAMED
     assert not d.effects
@@ -37,7 +37,7 @@ def test_a_force_without_a_name():
 
 
 @pytest.mark.parametrize("d", [nothing, named, unnamed])
-def test_json_has_the_keys_of_the_exchange_format(d):
+def test_diagnosis_json_has_the_keys_of_the_exchange_format(d):
     data = d().as_json()
     assert {
         "verdict",
@@ -53,7 +53,7 @@ def test_json_has_the_keys_of_the_exchange_format(d):
     assert all(len(p["ci90"]) == 2 for p in data["parameters"].values())
 
 
-def test_a_rival_without_a_size_is_called_by_its_name():
+def test_headline_names_a_rival_without_a_size():
     d = named()
     rival = Effect("drive.gain_asymmetry", "amplifier", 0.3, {}, (), "friction.coulomb:carriage")
     effects = (d.effects[0]._replace(confidence=0.6), rival)

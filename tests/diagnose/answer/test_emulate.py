@@ -1,4 +1,4 @@
-"""Closed loop of our own recordings by the tick of their config: with an own law, and with another plant."""
+"""Closed-loop emulation of recordings of the program: with user code as law, and with another plant."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -25,7 +25,7 @@ STEPS = [{"at": 0.2, "to": 0.02, "ramp": 0.2}, {"at": 1.6, "to": 0.0, "ramp": 0.
 
 @pytest.fixture(scope="module")
 def own(config, tmp_path_factory) -> Path:
-    """A recording of the axis under a law of the user's own; the law lies beside it."""
+    """Folder with a recording of the axis under a user law and the file of the law."""
     folder = tmp_path_factory.mktemp("own")
     (folder / "my_law.py").write_text((ROOT / "rtctl/own/templates/my_law.py").read_text())
     settings = yaml.safe_load((ROOT / "configs/axis.yaml").read_text())
@@ -38,13 +38,13 @@ def own(config, tmp_path_factory) -> Path:
 
 @pytest.fixture
 def foreign(monkeypatch):
-    """This process has read no own file."""
+    """Process state without a trusted user file."""
     monkeypatch.setattr(files, "_trusted", set())
     model._model.cache_clear()
     model._law.cache_clear()
 
 
-def test_without_the_file_the_recorded_command_is_the_input(own, foreign):
+def test_recording_with_an_untrusted_law_runs_in_open_loop(own, foreign):
     bundle = load_bundle(own / "run")
     record = of_bundle(bundle)
     assert not compare(record, bundle=bundle).closed
@@ -56,7 +56,7 @@ def test_without_the_file_the_recorded_command_is_the_input(own, foreign):
         emulate(bundle, record)
 
 
-def test_with_the_file_the_loop_is_closed_to_the_bit(own, foreign):
+def test_trusted_user_law_reproduces_the_recording_bit_for_bit(own, foreign):
     give([own / "my_law.py"])
     bundle = load_bundle(own / "run")
     record = of_bundle(bundle)
@@ -69,11 +69,11 @@ def test_with_the_file_the_loop_is_closed_to_the_bit(own, foreign):
 
 
 def with_values(record, **changes):
-    """The record under other parameters than its owner says."""
+    """The record with changed nominal parameters."""
     return graph_record(record.source, owner_model(record.source.case).change(**changes))
 
 
-def test_another_plant_gives_another_command(own, foreign):
+def test_heavier_plant_changes_the_emulated_command(own, foreign):
     give([own / "my_law.py"])
     bundle = load_bundle(own / "run")
     record = of_bundle(bundle)
@@ -82,14 +82,14 @@ def test_another_plant_gives_another_command(own, foreign):
     assert heavier.channels["u"].nrmse > 0.01
 
 
-def test_a_model_that_trips_the_machine_is_no_answer(own, foreign):
+def test_model_that_trips_the_machine_has_no_answer(own, foreign):
     give([own / "my_law.py"])
     bundle = load_bundle(own / "run")
     with pytest.raises(NoAnswer, match="trips the machine at tick"):
         emulate(bundle, with_values(of_bundle(bundle), K=1e-3))
 
 
-def test_a_described_machine_runs_its_own_tick(config, tmp_path):
+def test_emulation_of_a_described_machine_reproduces_the_recording(config, tmp_path):
     changes = {"name": config("axis").name, "loop.mode": "fused"}
     bundle = api.record(api.load_config("machines/belt", changes), 1.5, tmp_path / "run")
     record = of_bundle(bundle)
@@ -104,13 +104,13 @@ def test_a_described_machine_runs_its_own_tick(config, tmp_path):
 
 
 def heavier(machine):
-    """The description with one body of twice the mass or inertia."""
+    """Description with twice the mass or inertia of its first body."""
     name, body = next((n, b) for n, b in machine["bodies"].items() if "mass" in b or "inertia" in b)
     key = "mass" if "mass" in body else "inertia"
     return {**machine, "bodies": {**machine["bodies"], name: {**body, key: 2.0 * body[key]}}}
 
 
-def test_only_a_whole_recording_of_our_own_is_emulated(own):
+def test_only_complete_recordings_of_the_program_are_emulated(own):
     bundle = load_bundle(own / "run")
     assert can_emulate(bundle)
     assert not can_emulate(replace(bundle, case={**bundle.case, "config": None}))

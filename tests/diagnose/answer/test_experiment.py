@@ -1,4 +1,4 @@
-"""The experiment to run next: laws that look alike at one speed, told apart by the motion that is chosen."""
+"""Separating experiment: two friction laws that are equivalent at one speed, and a motion that separates them."""
 
 from functools import cache
 from pathlib import Path
@@ -31,7 +31,7 @@ CASE = case_of(ROTOR, RATE)
 
 
 def recorded(ref, name, *terms):
-    """The record of a rotor with `terms` beyond its description that follows `ref` (n,), rad."""
+    """Record of a rotor with the extra `terms` that follows `ref` (n,), rad."""
     n, case = len(ref), read_case(CASE, name)
     still = np.zeros(n)
     y, grain = {"encoder": still}, {"encoder": 1 / 1592.0}
@@ -43,14 +43,14 @@ def recorded(ref, name, *terms):
 
 
 def one_speed(seconds=4.0):
-    """Reference (n,) that turns one way at one speed."""
+    """Reference (n,) in rad of a rotation at constant speed."""
     t = np.arange(round(seconds * RATE)) / RATE
     return SPEED * (t - 0.1 * (1.0 - np.exp(-t / 0.1)))
 
 
 @cache
 def rivals():
-    """Record of a turn at one speed, at which friction of any law is one torque, and two laws fitted to it."""
+    """Record at constant speed, where every friction law is a constant torque, and fits of two laws."""
     record = recorded(one_speed(), "first", DRY)
     like, space = together([record])
     found = hypotheses(like.sim, nominal(record.case))
@@ -60,7 +60,7 @@ def rivals():
 
 @cache
 def plan():
-    """What is planned where the two laws are as probable."""
+    """Planned experiment for two equally probable laws."""
     record, fits = rivals()
     table = tuple(Rival(f, None, 0.0, 0.5) for f in fits)
     decided = SimpleNamespace(best=fits[0], table=table, probabilities=tuple((f.names, 0.5) for f in fits))
@@ -69,14 +69,14 @@ def plan():
 
 @cache
 def both():
-    """Diagnosis of the first recording and that of the experiment together."""
+    """Joint diagnosis of the first recording and the experiment."""
     motion = plan().experiment.motion
     t = np.arange(round(motion.seconds * RATE)) / RATE
     second = recorded(motion.reference(t), "second", DRY)
     return diagnose_record(rivals()[0], second)
 
 
-def test_the_laws_look_alike_at_one_speed_and_a_motion_tells_them_apart():
+def test_planned_motion_separates_laws_that_are_equivalent_at_one_speed():
     _, fits = rivals()
     assert abs(fits[0].power * (fits[0].loss - fits[1].loss)) < experiment.CLEAR
     found = plan().experiment
@@ -86,13 +86,13 @@ def test_the_laws_look_alike_at_one_speed_and_a_motion_tells_them_apart():
     assert plan().untold == ""
 
 
-def test_the_diagnosis_of_both_recordings_names_the_law():
+def test_joint_diagnosis_with_the_experiment_names_the_law():
     d = both()
     assert d.verdict == NAMED
     assert [e.name for e in d.effects] == [DRY["term"]]
 
 
-def test_it_is_told_in_the_json_the_report_and_a_file_that_runs():
+def test_experiment_appears_in_json_and_report_and_as_a_valid_config():
     d = both()._replace(planned=plan())
     told = d.as_json()["separating_experiment"]
     assert told["why"]["rivals"] == list(plan().experiment.rivals)
@@ -104,7 +104,7 @@ def test_it_is_told_in_the_json_the_report_and_a_file_that_runs():
     assert settings.law.position.gain == pytest.approx(30.0**2 * 1e-3)
 
 
-def test_equal_rivals_are_told_by_no_motion():
+def test_identical_rivals_have_no_separating_experiment():
     record, fits = rivals()
     found = experiment.design(record, [fits[0], fits[0]], fits[0])
     assert max(found.nats.values()) == pytest.approx(0.0, abs=1e-9)

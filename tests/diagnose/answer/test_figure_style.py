@@ -16,19 +16,19 @@ CASE = {
 
 
 def texts(figure):
-    """All words in a figure."""
+    """All texts of a figure."""
     return " | ".join(t.get_text() for t in figure.findobj(lambda a: hasattr(a, "get_text")) if t.get_text())
 
 
 def visible(figure):
-    """Boxes of what is written, as drawn."""
+    """Bounding boxes of the drawn texts."""
     figure.canvas.draw()
     renderer = figure.canvas.get_renderer()
     out = []
     for ax in figure.axes:
         if ax.name == "polar":
             continue
-        slanted = any(t.get_rotation() for t in ax.get_xticklabels())  # boxes of slanted words always meet
+        slanted = any(t.get_rotation() for t in ax.get_xticklabels())  # boxes of slanted texts always overlap
         ticks = []
         for along, axis in ((0, ax.xaxis), (1, ax.yaxis)):
             low, high = sorted(axis.get_view_interval())

@@ -60,7 +60,7 @@ def record_of(kind, **changes):
 
 
 def model_of(record):
-    """The owner's model with one term, as a fit makes it."""
+    """Nominal model with one term, as from a fit."""
     entry = TERM_OF[record.plant]
     fields = TERMS[entry["term"]].settings.model_fields.items()
     defaults = {n: f.get_default() for n, f in fields if not f.is_required()}
@@ -68,7 +68,7 @@ def model_of(record):
 
 
 @pytest.mark.parametrize("kind", CASES)
-def test_a_model_comes_back_from_its_file(kind, tmp_path):
+def test_model_file_round_trip(kind, tmp_path):
     record = record_of(kind)
     model = model_of(record)
     back = read_model(write_model(model, record, tmp_path / "model.yaml"), record)
@@ -83,7 +83,7 @@ def test_a_model_comes_back_from_its_file(kind, tmp_path):
 
 
 @pytest.mark.parametrize("kind", CASES)
-def test_the_file_is_a_config_that_can_be_built(kind, tmp_path):
+def test_model_file_is_a_valid_config(kind, tmp_path):
     record = record_of(kind)
     path = write_model(model_of(record), record, tmp_path / "model.yaml")
     config = load_settings(path, machines.CONFIGS[kind])
@@ -94,7 +94,7 @@ def test_the_file_is_a_config_that_can_be_built(kind, tmp_path):
 
 
 @pytest.mark.parametrize("kind", CASES)
-def test_values_have_six_digits_and_defaults_are_left_out(kind):
+def test_model_config_has_six_digits_and_no_defaults(kind):
     record = record_of(kind)
     plant = to_config(model_of(record), record)["plant"]
     assert plant["physics"][0].keys() == TERM_OF[kind].keys()
@@ -103,7 +103,7 @@ def test_values_have_six_digits_and_defaults_are_left_out(kind):
             assert value == float(f"{value:.6g}")
 
 
-def test_a_config_that_was_recorded_is_kept_but_for_the_plant():
+def test_recorded_config_changes_only_in_the_plant():
     record = record_of("axis")
     own = {
         "name": "bench",
@@ -117,10 +117,10 @@ def test_a_config_that_was_recorded_is_kept_but_for_the_plant():
     assert made["plant"]["rate"] == 2000.0
     assert made["plant"]["parameters"]["M"] == 95.0
     assert [entry["term"] for entry in made["plant"]["physics"]] == ["load.bump"]
-    assert own["plant"]["parameters"] == {"M": 1.0}  # the caller's is untouched
+    assert own["plant"]["parameters"] == {"M": 1.0}  # the argument is unchanged
 
 
-def test_the_gear_ratio_of_the_owner_is_kept(tmp_path):
+def test_nominal_gear_ratio_is_kept(tmp_path):
     record = record_of("ldu", parameters={"N": 19.0})  # and R_t / R_s is 20
     back = read_model(write_model(owner_model(record.case), record, tmp_path / "m.yaml"), record)
     assert back.base["N"] == pytest.approx(19.0, rel=1e-5)
@@ -138,7 +138,7 @@ def test_the_gear_ratio_of_the_owner_is_kept(tmp_path):
         ("ldu", {"sensors": {"encoder_counts_per_rev": 20000.5, "scale_m_per_count": 5e-7}}, "20000.5 counts a turn"),
     ],
 )
-def test_the_head_says_what_could_not_be_carried_over(kind, changes, words, tmp_path):
+def test_header_lists_what_could_not_be_translated(kind, changes, words, tmp_path):
     record = record_of(kind, **changes)
     path = write_model(owner_model(record.case), record, tmp_path / "m.yaml")
     head = "".join(line[1:] for line in path.read_text().splitlines() if line.startswith("#"))
@@ -153,14 +153,14 @@ def test_the_head_says_what_could_not_be_carried_over(kind, changes, words, tmp_
         ({"F_v": float("inf")}, "parameters: F_v"),
     ],
 )
-def test_parameters_out_of_bounds(change, message, tmp_path):
+def test_parameters_out_of_bounds_are_refused(change, message, tmp_path):
     record = record_of("axis")
     with pytest.raises(UserError, match=message):
         write_model(owner_model(record.case).change(**change), record, tmp_path / "m.yaml")
     assert not (tmp_path / "m.yaml").exists()
 
 
-def test_terms_out_of_bounds(tmp_path):
+def test_terms_out_of_bounds_are_refused(tmp_path):
     record = record_of("axis")
     viscous = TERMS["friction.viscous"].settings
     for values, message in (
@@ -173,19 +173,19 @@ def test_terms_out_of_bounds(tmp_path):
             write_model(model, record, tmp_path / "m.yaml")
 
 
-def test_a_model_without_a_mass(tmp_path):
+def test_model_without_a_mass_is_refused(tmp_path):
     record = record_of("axis", parameters={})
     with pytest.raises(UserError, match="lacks M"):
         write_model(owner_model(record.case), record, tmp_path / "m.yaml")
 
 
-def test_a_folder_that_is_not_there(tmp_path):
+def test_missing_folder_is_reported(tmp_path):
     record = record_of("axis")
     with pytest.raises(UserError, match="cannot be written: No such file"):
         write_model(owner_model(record.case), record, tmp_path / "no" / "m.yaml")
 
 
-def test_another_machine_is_refused(tmp_path):
+def test_model_of_another_machine_is_refused(tmp_path):
     record = record_of("axis")
     with pytest.raises(UserError, match="machine is ivu, and the bundle was recorded on the axis"):
         read_model("ivu", record)
@@ -194,7 +194,7 @@ def test_another_machine_is_refused(tmp_path):
         read_model(tmp_path / "x.yaml", record)
 
 
-def test_a_shipped_config_is_a_model():
+def test_shipped_config_is_read_as_a_model():
     model = read_model("ivu", record_of("ivu"))
     assert (model.base["R1"], model.base["d_tape"], model.terms) == (0.038, 0.5e-3, ())
     assert model.base["J_1"] > 0
@@ -206,7 +206,7 @@ def test_a_shipped_config_is_a_model():
     F=st.floats(-1e3, 1e3).filter(lambda x: abs(x) > 1e-9),
 )
 @settings(deadline=None, max_examples=30)
-def test_any_axis_comes_back(tmp_path_factory, M, K, F):
+def test_axis_model_round_trip_for_any_values(tmp_path_factory, M, K, F):
     record = record_of("axis")
     spring = TERMS["load.spring"].settings.model_construct(term="load.spring", node="carriage", k=F, x0=0.0)
     model = owner_model(record.case).change(M=M, K=K).add(spring)
@@ -215,7 +215,7 @@ def test_any_axis_comes_back(tmp_path_factory, M, K, F):
 
 
 @pytest.mark.parametrize("name", ["blind/practice/case-0001", "blind/practice/case-0004", "data/emps"])
-def test_recordings_from_outside(name, tmp_path):
+def test_model_round_trip_of_foreign_recordings(name, tmp_path):
     if not (SHARED / name).is_dir():
         pytest.skip("needs the recordings in ../shared")
     record = load_record(SHARED / name)
@@ -224,7 +224,7 @@ def test_recordings_from_outside(name, tmp_path):
     assert back.base == pytest.approx(model.base, rel=1e-5)
 
 
-def test_the_turn_is_a_table(tmp_path):
+def test_torque_ripple_map_is_written_as_a_table(tmp_path):
     angle = np.array([0.5, 1.5, 2.5])
     found = Turn(angle, np.array([1e-3, np.nan, -2e-3]), np.array([1e-4, np.nan, 2e-4]), np.array([4, 0, 5]), (), 5.0)
     path = write_turn(found, tmp_path / "torque_over_turn.csv")

@@ -18,21 +18,21 @@ SECONDS = 2.0
 
 
 @cache
-def rubbing():
-    """A belt axis whose carriage rubs more than its owner says."""
+def recording_with_extra_friction():
+    """Recording of a belt axis with extra dry friction of the carriage."""
     return record(case_of(BELT, problem="driven"), command(6.0), terms=[RUB])
 
 
 @pytest.fixture
 def model(tmp_path):
-    """A file of the same machine with what its owner does not know of."""
+    """Model file of the machine with the extra dry friction."""
     path = tmp_path / "model.yaml"
     path.write_text(yaml.safe_dump({"machine": BELT, "plant": {"physics": [RUB]}}))
     return path
 
 
-def test_a_model_that_has_what_is_missing_is_nearer(model):
-    before, after = compare(rubbing()), compare(believing(rubbing(), model))
+def test_model_with_the_missing_effect_reduces_the_free_run_error(model):
+    before, after = compare(recording_with_extra_friction()), compare(believing(recording_with_extra_friction(), model))
     assert not before.closed and before.skipped == after.skipped > 0
     assert set(after.channels) == {"encoder", "scale"}
     assert after.channels["scale"].unit == "m" and after.channels["encoder"].unit == "rad"
@@ -40,28 +40,28 @@ def test_a_model_that_has_what_is_missing_is_nearer(model):
         assert channel.nrmse < 0.02 < 0.2 * before.channels[name].nrmse
 
 
-def test_rows_at_the_start_are_followed(model):
-    whole = compare(believing(rubbing(), model), skip=1000)
-    assert whole.skipped == 1000 and len(whole.t) == len(rubbing().t) - 1000
-    assert whole.channels["encoder"].recorded[0] == rubbing().y["encoder"][1000]
+def test_skipped_rows_are_tracked_before_the_free_run(model):
+    whole = compare(believing(recording_with_extra_friction(), model), skip=1000)
+    assert whole.skipped == 1000 and len(whole.t) == len(recording_with_extra_friction().t) - 1000
+    assert whole.channels["encoder"].recorded[0] == recording_with_extra_friction().y["encoder"][1000]
 
 
 @pytest.mark.parametrize(
     ("words", "message"), [({"closed": True}, "its law is not known"), ({"skip": 10**6}, "--skip")]
 )
-def test_what_cannot_be_is_refused(words, message):
+def test_closed_loop_without_a_law_and_excessive_skip_are_refused(words, message):
     with pytest.raises(UserError, match=message):
-        compare(rubbing(), **words)
+        compare(recording_with_extra_friction(), **words)
 
 
-def test_a_model_of_another_machine_is_refused(tmp_path):
+def test_model_of_another_machine_is_refused(tmp_path):
     other = tmp_path / "other.yaml"
     other.write_text(yaml.safe_dump({**BELT, "bodies": {**BELT["bodies"], "wheel": {"inertia": 1e-5}}}))
     with pytest.raises(UserError, match="wheel"):
-        believing(rubbing(), other)
+        believing(recording_with_extra_friction(), other)
 
 
-def test_the_loop_is_closed_by_its_own_law():
+def test_free_run_closes_the_loop_with_the_recorded_law():
     config = set_path(load_config("machines/belt", []), "loop.mode", "fused")
     rows = fused.run(config, SECONDS + 0.5).between(0.0, SECONDS)
     empty = at_rest(config, SECONDS)

@@ -1,4 +1,4 @@
-"""Free runs of machines of exchange format 1 against recordings that their own models made."""
+"""Free runs of machines of exchange format 1 against recordings simulated with the nominal model."""
 
 import numpy as np
 import pytest
@@ -33,7 +33,7 @@ IVU = {
 
 @pytest.fixture(scope="module")
 def recorded():
-    """`recorded(case)`: what the owner's own model does under its law, and so a recording without any error."""
+    """`recorded(case)`: simulation of the nominal model under its law, a recording without model error."""
 
     def make(case, n=3000):
         read = read_case(case, ".")
@@ -44,7 +44,7 @@ def recorded():
 
 
 def compare(record, *terms, closed=None, skip=0):
-    """The comparison of a record with the owner's model and these terms."""
+    """Comparison of a record with the nominal model and the given terms."""
     return freerun.compare(graph_record(record, owner_model(record.case).add(*terms)), closed, skip)
 
 
@@ -52,7 +52,7 @@ def spring(k):
     return TERMS["load.spring"].settings(term="load.spring", node="carriage", k=k)
 
 
-def test_the_model_that_made_it_fits_in_both_modes(recorded):
+def test_true_model_fits_in_closed_and_open_loop(recorded):
     record = recorded(AXIS)
     by_law = compare(record)
     assert by_law.closed and set(by_law.channels) == {"x", "u"}
@@ -62,7 +62,7 @@ def test_the_model_that_made_it_fits_in_both_modes(recorded):
     assert free.channels["x"].rmse < 1e-9
 
 
-def test_errors_are_root_mean_squares_in_the_channels_unit(recorded):
+def test_free_run_error_is_the_rms_in_the_unit_of_the_channel(recorded):
     record = recorded(AXIS)
     shifted = record._replace(y={"x": record.y["x"] + np.where(np.arange(len(record.t)) < 500, 0.0, 2e-3)})
     result = compare(shifted, closed=False, skip=500)
@@ -71,7 +71,7 @@ def test_errors_are_root_mean_squares_in_the_channels_unit(recorded):
     assert result.as_json()["unit"] == {"x": "m"}
 
 
-def test_rows_that_are_skipped_do_not_count(recorded):
+def test_skipped_rows_do_not_count(recorded):
     record = recorded(AXIS)
     result = compare(record, closed=True, skip=20)
     assert result.as_json()["skipped"] == 20
@@ -81,11 +81,11 @@ def test_rows_that_are_skipped_do_not_count(recorded):
             compare(record, closed=False, skip=skip)
 
 
-def test_a_missing_term_shows(recorded):
+def test_wrong_term_raises_the_free_run_error(recorded):
     assert compare(recorded(AXIS), spring(300.0), closed=False).channels["x"].nrmse > 0.05
 
 
-def test_reels_are_compared_up_to_a_constant(recorded):
+def test_reel_counters_are_compared_up_to_a_constant(recorded):
     record = recorded(IVU)
     y = {name: values + (7.0 if name.startswith("reel") else 0.0) for name, values in record.y.items()}
     channels = compare(record._replace(y=y)).channels
@@ -98,12 +98,12 @@ def test_reels_are_compared_up_to_a_constant(recorded):
     assert channels["u1"].unit == "V"
 
 
-def test_a_model_that_runs_away(recorded):
+def test_divergent_model_has_no_answer(recorded):
     with pytest.raises(NoAnswer, match=r"ran away at tick \d+ \(.* s\) in open loop"):
         compare(recorded(AXIS), spring(-1e6), closed=False)
 
 
-def test_a_law_that_nobody_knows_closes_no_loop(recorded):
+def test_unknown_law_allows_only_an_open_loop(recorded):
     record = recorded(AXIS)
     record = record._replace(case=record.case._replace(controller_known=False))
     assert not compare(record).closed
@@ -111,22 +111,22 @@ def test_a_law_that_nobody_knows_closes_no_loop(recorded):
         compare(record, closed=True)
 
 
-def test_a_recorded_speed_is_compared_with_a_speed(recorded):
+def test_recorded_speed_is_compared_with_the_simulated_speed(recorded):
     record = recorded(AXIS)
     speed = np.gradient(record.y["x"], record.dt)
     result = compare(record._replace(y={"speed": speed}, case=record.case._replace(controller_known=False)))
-    assert result.channels["speed"].nrmse < 1e-3  # of a difference quotient over two ticks
+    assert result.channels["speed"].nrmse < 1e-3  # error of a central difference over two ticks
     assert result.channels["speed"].unit == "m/s"
 
 
 def cut(record, rows):
-    """Some rows of a record."""
+    """The given rows of a record."""
     arrays = {name: getattr(record, name)[rows] for name in ("t", "ref", "w", "u")}
     return record._replace(y={name: values[rows] for name, values in record.y.items()}, **arrays)
 
 
-def test_a_free_run_begins_as_the_recording_does(recorded):
-    """In the middle of a motion, at a place and a speed that the record shows."""
+def test_free_run_begins_with_the_recorded_position_and_speed(recorded):
+    """The record starts in the middle of a motion."""
     record = recorded(AXIS)
     later = cut(record, slice(700, None))
     made = graph_record(later)
@@ -136,7 +136,7 @@ def test_a_free_run_begins_as_the_recording_does(recorded):
     assert compare(later, closed=False).channels["x"].rmse < 1e-6
 
 
-def test_a_speed_begins_with_the_speed_that_the_first_rows_have():
+def test_free_run_of_a_speed_sensor_begins_with_the_recorded_speed():
     case = read_case(
         {"plant": "axis", "sample_rate": 50.0, "parameters": {"M": 1.0, "F_v": 2.0}, "controller": {"kind": "unknown"},
          "drive": {"newton_per_volt": 4.0}}, "."
@@ -150,8 +150,8 @@ def test_a_speed_begins_with_the_speed_that_the_first_rows_have():
     assert result.as_json()["unit"] == {"speed": "m/s"}
 
 
-def test_a_command_that_was_smooth_is_taken_as_smooth():
-    """An oscillator driven near its resonance: held samples come half a tick late, and the recording tells."""
+def test_smooth_command_is_not_treated_as_held():
+    """Oscillator driven near its resonance: a held command is half a tick late, which the recording shows."""
     case = {**AXIS, "sample_rate": 500.0, "controller": {"kind": "none"},
             "parameters": {"M": 1.0, "F_v": 20.0, "F_c": 0.0, "k": (2 * np.pi * 40) ** 2}}  # fmt: skip
     read = read_case(case, ".")
@@ -164,9 +164,9 @@ def test_a_command_that_was_smooth_is_taken_as_smooth():
     assert compare(record._replace(y={"x": answer.imag}), closed=False, skip=200).channels["x"].nrmse < 0.03
 
 
-def test_a_machine_of_several_bodies_that_rests_begins_at_rest(recorded):
+def test_machine_at_rest_begins_its_free_run_at_rest(recorded):
     record = recorded(IVU)
-    n = 200  # rows before it moves
+    n = 200  # rows at rest
     ref = np.concatenate([np.zeros(n), record.ref])
     made = at_rest(record.case, n + len(record.t), ref)
     y, u = closed(made, owner_model(record.case))
@@ -176,7 +176,7 @@ def test_a_machine_of_several_bodies_that_rests_begins_at_rest(recorded):
     assert later.skipped > 0
 
 
-def test_a_belief_without_a_mass_is_told():
+def test_missing_mass_is_reported():
     case = read_case({**AXIS, "parameters": {}}, ".")
     wave = np.sin(np.arange(2000.0))
     record = at_rest(case, 2000, u=wave[:, None])._replace(y={"x": np.cos(np.arange(2000.0))})

@@ -12,7 +12,7 @@ def config():
     return lambda kind, *changes: load_settings(find(kind), machines.CONFIGS[kind], changes)
 
 
-def test_tape_and_reel_move_together(config):
+def test_duty_of_tape_and_reel_is_consistent(config):
     ivu = config("ivu")
     capstan, reel, tape = (use(node, ivu) for node in ("capstan", "reel1", "tape1"))
     assert reel.speed * 0.038 == pytest.approx(capstan.speed * 0.0125)
@@ -20,7 +20,7 @@ def test_tape_and_reel_move_together(config):
     assert tape.force * 0.038 == pytest.approx(reel.force)
 
 
-def test_a_gear_gives_in_force_what_it_takes_in_speed(config):
+def test_duty_conserves_power_through_a_gear(config):
     ldu = config("ldu")
     motor, wheel, carriage = (use(node, ldu) for node in ("motor", "wheel", "carriage"))
     power = carriage.force * carriage.speed
@@ -29,13 +29,13 @@ def test_a_gear_gives_in_force_what_it_takes_in_speed(config):
     assert motor.speed == pytest.approx(20 * wheel.speed)
 
 
-def test_the_command_is_within_what_the_drives_have(config):
+def test_rms_command_is_within_the_drive_limit(config):
     for kind in ("ivu", "ldu", "axis"):
         machine = config(kind)
         assert 0.01 * machine.law.limit.high < rms_volts(machine) < 0.5 * machine.law.limit.high
 
 
-def test_measures(config):
+def test_measures_of_nodes(config):
     axis = config("axis")
     u = use("carriage", axis)
     assert measure("drag", "carriage", axis) == pytest.approx(u.force / u.speed)

@@ -20,7 +20,7 @@ DRAGS = Effect("friction.asymmetry", "carriage", 0.5, {"a": Interval(0.2, 0.1, 0
 
 
 class Strict(HTMLParser):
-    """Collects what is wrong with a page, and what is in it."""
+    """Parser that collects the errors and the content of a page."""
 
     def __init__(self):
         super().__init__()

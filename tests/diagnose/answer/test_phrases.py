@@ -9,14 +9,14 @@ IVU = {"tau_F1": 0.0024, "tau_F2": 0.0026, "tau_Fc": 1e-4}
 
 
 class FakeRecord:
-    """What words ask of a record."""
+    """Record attributes used by the phrases."""
 
     plant = "ivu"
     y = {"capstan_counts": np.array([-1000.0, 1000.0] * 50)}  # noqa: RUF012
 
 
 def sample(name: str, value: float = 0.01) -> dict[str, Interval]:
-    """Any values for the parameters that a term asks for."""
+    """Intervals for the required parameters of a term."""
     fields = TERMS[name].settings.model_fields
     wanted = [n for n, f in fields.items() if f.is_required() and n != "node"]
     wanted += ["F_added"] * (name == "friction.coulomb")

@@ -9,12 +9,12 @@ from rtctl.diagnose.model.model import nominal
 
 
 def settings(record):
-    """Checked settings of the law of a record, in a config of its machine."""
+    """Validated settings of the law of a record, in a config of its machine."""
     data = {**to_config(nominal(record.case), record), "law": played_law(record)}
     return machines.class_of(data).model_validate(data).law
 
 
-def test_the_law_of_the_case_is_that_of_the_config():
+def test_law_of_the_case_becomes_the_law_of_the_config():
     made, wanted = settings(bundle(law())), belt()[0].law
     assert (made.feedback, made.drive) == ("encoder", "amplifier")
     assert made.position.gain == pytest.approx(wanted.position.gain)
@@ -22,7 +22,7 @@ def test_the_law_of_the_case_is_that_of_the_config():
     assert made.position.derivative_filter == pytest.approx(wanted.position.derivative_filter)
 
 
-def test_sections_and_cascade_have_their_place():
+def test_sections_and_cascade_laws_are_translated():
     rows = belt()[1]
     x = np.array(rows["encoder_counts"]) / belt()[0].machine.sensors["encoder"].scale
     e = np.array(rows["ref"]) - x
@@ -35,12 +35,12 @@ def test_sections_and_cascade_have_their_place():
     assert (found.kind, found.gain, found.velocity_gain) == ("pi_velocity", 2.0, 0.1)
 
 
-def test_a_law_that_pushes_backwards_is_no_law_of_a_config():
+def test_law_with_negative_gain_is_replaced_by_a_stand_in():
     e = np.array(belt()[1]["ref"]) - np.array(belt()[1]["encoder_counts"]) / belt()[0].machine.sensors["encoder"].scale
     record = bundle({"kind": "pd", "P": -1.0, "D": 0.0, "sensor": "encoder"}, u=np.clip(-e, -10.0, 10.0))
     assert record.case.controller is not None
     assert "shares" in played_law(record)  # the stand-in
 
 
-def test_without_a_law_a_stand_in_is_played():
+def test_unknown_law_is_replaced_by_a_stand_in():
     assert "shares" in played_law(bundle({"kind": "unknown"}))

@@ -8,5 +8,5 @@ from rtctl.diagnose.answer.results import finite
 
 
 @given(st.recursive(st.floats() | st.integers() | st.none() | st.text(), lambda c: st.lists(c) | st.tuples(c, c)))
-def test_finite_is_json(value):
+def test_finite_values_are_valid_json(value):
     json.dumps(finite({"value": value, "array": np.array([1.0, np.inf])}), allow_nan=False)

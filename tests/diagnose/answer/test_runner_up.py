@@ -1,4 +1,4 @@
-"""What the next likeliest answer lost by, and where."""
+"""Log-likelihood difference of the second most probable answer, per segment."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from rtctl.diagnose.evidence.evidence import SEGMENTS
 
 
 @pytest.mark.parametrize("d", [named, nothing, unnamed])
-def test_the_next_answer_is_another_one(d):
+def test_runner_up_has_a_loss_in_every_segment(d):
     lost = lost_by(d())
     assert len(lost.nats) == SEGMENTS
     begin, end = d().found.like.rows
@@ -19,8 +19,8 @@ def test_the_next_answer_is_another_one(d):
     assert sentence(d()).startswith(f"The next likeliest answer is {lost.other}.")
 
 
-def test_what_the_parts_say_is_the_gap_of_the_likelihoods():
-    """Of two models without a free function: the losses of the two under their own noise."""
+def test_segment_losses_sum_to_the_log_likelihood_difference():
+    """For models without a free function, each under its own noise model."""
     d = named()
     pairs = [(r.fit, r.free) for r in d.decided.table if r.free is None]
     lost = lost_by(d)
@@ -32,7 +32,7 @@ def test_what_the_parts_say_is_the_gap_of_the_likelihoods():
 
 
 @pytest.mark.parametrize(("verdict", "d"), [("named", named), ("nothing", nothing), ("unnamed", unnamed)])
-def test_the_answer_is_what_the_verdict_says(verdict, d):
+def test_answer_among_the_rivals_matches_the_verdict(verdict, d):
     from rtctl.diagnose.answer.posterior import rivals
 
     own = next(bar for bar in rivals(d()) if answers(d(), bar))
@@ -41,7 +41,7 @@ def test_the_answer_is_what_the_verdict_says(verdict, d):
     assert own.names == (() if verdict == "nothing" else own.names)
 
 
-def test_the_parts_that_decide_are_told():
+def test_sentence_names_the_decisive_rows():
     edges = np.arange(9.0)
     here = Lost("x", 0.0, 30.0, edges, np.array([0.0, 0.0, 10.0, 12.0, 0.5, 0.0, 8.0, 0.0]))
     assert when(here, 1) == "It loses half of that in the rows from 2 to 4 s."
@@ -52,17 +52,17 @@ def test_the_parts_that_decide_are_told():
     assert when(here, 2) == ""
 
 
-def test_neighbours_are_one_run():
+def test_adjacent_segments_form_one_run():
     assert runs(np.array([1, 2, 3, 7, 9, 10])) == [(1, 3), (7, 7), (9, 10)]
 
 
-def test_the_report_says_why_the_next_answer_lost():
+def test_report_explains_the_runner_up():
     page = html(unnamed())
     assert "The next likeliest answer is" in page
     assert "What each part of the recording says for the answer" in page
 
 
-def test_nothing_is_drawn_where_no_part_says_anything():
+def test_report_omits_the_segment_figure_without_evidence():
     assert not lost_by(named()).nats.any()
     page = html(named())
     assert "The rows do not decide between them" in page

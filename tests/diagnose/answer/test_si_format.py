@@ -16,26 +16,26 @@ SCALE = {"": 1, "m": 1e-3, "u": 1e-6, "n": 1e-9}
         (3e-12, "m", "0.0030 nm"), (0.25, "", "0.25"), (float("inf"), "V", "any size"), (float("nan"), "V", "unknown"),
     ],
 )  # fmt: skip
-def test_numbers_with_sensible_prefixes(value, unit, text):
+def test_numbers_are_formatted_with_si_prefixes(value, unit, text):
     assert nice(value, unit) == text
 
 
 @settings(deadline=None)
 @given(st.floats(1e-9, 1e6), st.sampled_from(["Nm", "V", "s", "m"]))
-def test_a_formatted_number_reads_back_to_its_figures(value, unit):
+def test_formatted_number_reads_back_within_its_precision(value, unit):
     number, shown = nice(value, unit, 3).split()
     prefix = shown.removesuffix(unit)
     assert float(number) * SCALE[prefix] == pytest.approx(value, rel=5.1e-3)
 
 
-def test_two_sizes_show_where_they_differ():
+def test_two_sizes_are_formatted_to_their_difference():
     assert both(0.003124, 0.003081, "Nm") == ("3.12 mNm", "3.08 mNm")
 
 
-def test_a_span_has_one_unit():
+def test_span_is_formatted_with_one_unit():
     assert span(-0.0047, 0.00024, "m") == "-4.7 to 0.24 mm"
     assert span(0.0, 3.0, "rad") == "0 to 3.0 rad"
 
 
-def test_a_share():
+def test_share_is_formatted_in_percent():
     assert percent(0.0344) == "3.4 %"

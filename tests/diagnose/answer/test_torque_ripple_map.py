@@ -1,4 +1,4 @@
-"""The map of the torque over one turn, of axes whose torque is known."""
+"""Torque ripple map over one turn, of axes with a known torque."""
 
 import numpy as np
 import pytest
@@ -17,12 +17,12 @@ CASE = {
 
 
 def ripple(x):
-    """What the axis meets, Nm."""
+    """Torque ripple (Nm) at angle x (rad)."""
     return 5e-3 * np.cos(7 * x + 0.4) + 1e-3 * np.sin(12 * x)
 
 
 def spinning(speed, seconds, noise=0.0, **case):
-    """A record of an axis that some controller keeps at `speed` (rad/s), and what its owner believes."""
+    """Record of an axis under an unknown controller at `speed` (rad/s), and its nominal model."""
     t = np.arange(round(seconds * 500)) / 500.0
     x = speed * t + 0.3 * np.sin(2 * np.pi * 0.2 * t)
     acceleration = -0.3 * (2 * np.pi * 0.2) ** 2 * np.sin(2 * np.pi * 0.2 * t)
@@ -33,7 +33,7 @@ def spinning(speed, seconds, noise=0.0, **case):
     return check(columns, read), owner_model(read)
 
 
-def test_many_turns_give_the_torque_and_how_sure_it_is():
+def test_many_turns_give_the_torque_ripple_with_its_band():
     record, model = spinning(3.0, 40.0, noise=0.2)
     found = over_turn(record, model)
     assert found.turns == pytest.approx(19, abs=1)
@@ -47,12 +47,12 @@ def test_many_turns_give_the_torque_and_how_sure_it_is():
     assert found.orders[0].share == pytest.approx(25 / 26, abs=0.03)
 
 
-def test_it_is_the_same_the_other_way_round():
+def test_torque_ripple_does_not_depend_on_the_direction():
     found = over_turn(*spinning(-3.0, 40.0))
     assert np.std(found.torque - ripple(found.angle)) < 0.05 * np.std(ripple(found.angle))
 
 
-def test_part_of_a_turn_leaves_the_rest_open():
+def test_unvisited_angles_have_no_torque():
     found = over_turn(*spinning(0.4, 10.0))
     assert 0.5 < found.turns < 0.7
     assert np.array_equal(np.isnan(found.torque), found.visits == 0)
@@ -64,7 +64,7 @@ def test_part_of_a_turn_leaves_the_rest_open():
     assert (found.band[known] > 0).all()
 
 
-def test_an_axis_that_slides_or_stands_has_none():
+def test_sliding_or_resting_axis_has_no_torque_ripple_map():
     record, model = spinning(3.0, 10.0)
     sliding = record.case._replace(sensors=record.case.sensors.model_copy(update={"unit": "m"}))
     assert over_turn(record._replace(case=sliding), model) is None

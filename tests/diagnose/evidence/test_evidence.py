@@ -8,23 +8,23 @@ from rtctl.diagnose.likelihood.joint import together
 from rtctl.diagnose.search.hypotheses import hypotheses
 
 
-def test_what_every_segment_says_stays_sure():
+def test_evidence_of_every_segment_gives_a_sure_posterior():
     losses = np.stack([np.full(SEGMENTS, 0.0), np.full(SEGMENTS, 1.0)])
     chances = bagged(-losses.sum(axis=1), losses)
     assert chances[0] > 0.999
     assert chances.sum() == pytest.approx(1.0)
 
 
-def test_models_that_divide_the_segments_are_near_one_half():
+def test_models_that_share_the_segments_get_about_equal_posteriors():
     losses = np.zeros((2, SEGMENTS))
     losses[0, ::2] = losses[1, 1::2] = 20.0
-    losses[1, 0] += 3.0  # alone, the whole recording would be sure of the first
+    losses[1, 0] += 3.0  # the posterior of the whole recording favours the first model
     merits = -losses.sum(axis=1)
     assert 1.0 / (1.0 + np.exp(merits[1] - merits[0])) > 0.95
     assert bagged(merits, losses)[0] == pytest.approx(0.5, abs=0.1)
 
 
-def test_segments_alike_leave_the_posterior_of_the_whole():
+def test_equal_segments_keep_the_posterior_of_the_whole_recording():
     merits = np.array([0.0, -1.0, -2.0])
     odds = np.exp(merits)
     np.testing.assert_allclose(bagged(merits, np.ones((3, SEGMENTS))), odds / odds.sum())
@@ -35,15 +35,15 @@ def test_segments_alike_leave_the_posterior_of_the_whole():
     [(["friction.coulomb"], {"velocity"}), (["load.gravity"], {"angle", "position"}),
      (["load.spring", "drive.deadband"], {"position", "command"}), ([], set())],
 )  # fmt: skip
-def test_a_law_is_wrong_along_its_own_argument(terms, axes):
+def test_law_error_depends_on_the_argument_of_the_law(terms, axes):
     assert set(arguments([(term, 1.0) for term in terms])) == axes
 
 
-def test_no_law_of_a_motion_is_wrong_along_time():
+def test_law_error_of_a_resonance_does_not_depend_on_time():
     assert "time" not in arguments([("structure.resonance", 1.0)])
 
 
-def test_a_law_is_wrong_by_a_share_of_its_own_effect():
+def test_law_error_is_proportional_to_the_effect():
     offset = {"term": "drive.offset", "node": "amplifier", "offset": 0.01}
     like, space = together([record(case_of(BELT), command(0.6), [RUB, offset])])
     base = refit(like, space)

@@ -4,7 +4,7 @@ from graph_cases import CROSSTALK, misread, nothing, unnamed
 from rtctl.diagnose.evidence.free import free_functions
 
 
-def test_a_force_counts_by_what_its_simulation_leaves():
+def test_free_force_is_judged_by_the_residual_of_its_simulation():
     base = unnamed().found.base
     best = max(free_functions(base), key=lambda f: f.evidence)
     assert best.evidence > 0.0 and best.kind == "a force"
@@ -14,14 +14,14 @@ def test_a_force_counts_by_what_its_simulation_leaves():
     e = like.of_readings(sim.pushed(force).run(model))
     taken, told = np.mean(base.e**2) - np.mean(e**2), np.mean(base.e**2) - np.mean(best.e**2)
     assert told > 0.0
-    assert taken > 0.3 * told  # the parameters of the base moved along with it
+    assert taken > 0.3 * told  # the free fit also moves the base parameters
 
 
-def test_a_machine_as_described_asks_for_neither_force_nor_error():
+def test_nominal_machine_has_no_free_force_and_no_reading_error():
     assert all(f.evidence < 3.0 for f in free_functions(nothing().found.base))
 
 
-def test_a_command_that_leaks_into_a_reading_is_an_error_of_that_reading_by_the_command():
+def test_command_crosstalk_is_a_reading_error_that_depends_on_the_command():
     d = misread()
     free = d.decided.unlisted
     assert d.verdict == "unnamed"

@@ -1,11 +1,11 @@
-"""Missing forces in bins."""
+"""Binned missing forces."""
 
 import numpy as np
 
 from rtctl.diagnose.evidence.hats import binned
 
 
-def test_a_line_is_followed():
+def test_bins_reproduce_a_line():
     x = np.tile(np.linspace(-1.0, 1.0, 500), 8)
     middle, y, half, law = binned(x, 3.0 * x, 2.0 * x, 10, 20, np.mean)
     np.testing.assert_allclose(y, 3.0 * middle, atol=0.02)

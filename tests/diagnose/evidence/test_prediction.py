@@ -10,9 +10,9 @@ from rtctl.diagnose.search.hypotheses import hypotheses
 
 
 def with_gust():
-    """Fits of a belt axis whose carriage rubs, and on whose motor something pushes but in the last part.
+    """Fits of a belt axis with dry friction of the carriage and a motor torque that ends before the last part.
 
-    They are the base, and a model with dry friction and an offset of the amplifier.
+    Returns the base and a model with dry friction and an amplifier offset.
     """
     u = command(0.9)
     gust = np.where(np.arange(len(u)) < 0.7 * len(u), 0.02, 0.0)
@@ -24,7 +24,7 @@ def with_gust():
     return base, refit(like, space)
 
 
-def test_an_effect_that_predicts_worse_is_left_out_alone():
+def test_only_the_effect_with_worse_prediction_is_removed():
     base, both = with_gust()
     heldout, best = predict(base, both, True)
     assert best.names == ("friction.coulomb:carriage",)
@@ -32,14 +32,14 @@ def test_an_effect_that_predicts_worse_is_left_out_alone():
     assert heldout.after < heldout.before
 
 
-def test_all_effects_stay_where_none_may_go():
+def test_prediction_without_removal_keeps_all_effects():
     base, both = with_gust()
     heldout, best = predict(base, both)
     assert best is both
     assert heldout.fits[1].names == both.names
 
 
-def test_the_verdict_says_what_was_left_out():
+def test_verdict_names_the_removed_effect():
     d = named()
     best = d.decided.best
     more = best._replace(space=best.space.add(best.space.hypotheses[0]._replace(node="motor")))
@@ -50,10 +50,10 @@ def test_the_verdict_says_what_was_left_out():
     assert fewer(d.decided, best, "") is d.decided
 
 
-def test_a_model_that_is_nearer_is_ahead_though_larger_errors_were_expected_of_the_other():
+def test_nearer_model_is_ahead_of_a_model_with_larger_expected_noise():
     heldout = named().heldout
     base, best = heldout.fits
-    loud = best._replace(like=best.like.flat(base.e))  # knows of no better
+    loud = best._replace(like=best.like.flat(base.e))  # noise level of the base
     lone, both, deaf = ((f, heldout.late.raw(f.model)) for f in (base, best, loud))
     assert ahead(heldout.late, both, lone) > 100.0
     assert ahead(heldout.late, lone, both) < -100.0

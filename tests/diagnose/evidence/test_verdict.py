@@ -1,4 +1,4 @@
-"""What stands by the probabilities of all rivals together."""
+"""Verdict from the probabilities of all rivals."""
 
 import pytest
 from graph_cases import BELT, RUB, case_of, command, record
@@ -16,7 +16,7 @@ RUBS, DRAGS = "friction.coulomb:carriage", "friction.viscous:carriage"
 
 @pytest.fixture(scope="module")
 def fits():
-    """A function that gives the fit of a belt axis that rubs, with these names, and with a number that is doubted."""
+    """Function (effect names, doubted parameter) -> fit of a belt axis with dry friction."""
     like, space = together([record(case_of(BELT), command(0.6), [RUB])])
     base = refit(like, space)
     known = {h.name: h for h in hypotheses(like.sim, base.model)}
@@ -38,17 +38,19 @@ def listed(fit, probability):
     return Rival(fit, None, 0.0, probability)
 
 
-def test_a_name_that_holds_with_a_wrong_number_and_without_it_is_robust(fits):
+def test_effect_with_and_without_a_doubted_parameter_is_robust(fits):
     with_number = listed(fits(RUBS, doubted=GAIN), 0.8)
     assert robust((with_number, listed(fits(RUBS, DRAGS), 0.2)), (RUBS, DRAGS)) == (RUBS,)
-    assert robust((with_number, listed(fits(DRAGS), 0.2)), (DRAGS,)) == ()  # another without the wrong number
+    assert (
+        robust((with_number, listed(fits(DRAGS), 0.2)), (DRAGS,)) == ()
+    )  # another effect without the doubted parameter
 
 
-def test_a_name_beside_a_wrong_number_alone_is_not(fits):
+def test_effect_only_beside_a_doubted_parameter_is_not_robust(fits):
     assert robust((listed(fits(RUBS, doubted=GAIN), 0.99), listed(fits(RUBS), 0.01)), (RUBS,)) == ()
 
 
-def test_what_has_no_name_is_where_most_of_the_probability_lies_together(fits):
+def test_unnamed_force_is_located_by_the_summed_probability(fits):
     found = fits()
     table = rivals(Found(found.like, found, (), (found,), 3.0))
     free = [r for r in table if r.free is not None and r.unlisted]

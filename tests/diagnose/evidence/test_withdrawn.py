@@ -1,4 +1,4 @@
-"""Names that are withdrawn after the verdict."""
+"""Effects that are withdrawn after the verdict."""
 
 from graph_cases import named, nothing
 
@@ -9,7 +9,7 @@ from rtctl.diagnose.likelihood.fits import refit
 from rtctl.diagnose.search.hypotheses import hypotheses
 
 
-def test_a_name_that_predicts_worse_is_none():
+def test_effect_with_worse_prediction_is_withdrawn():
     d = named()
     assert borne_out(d.decided, d.heldout).verdict == NAMED
     worse = borne_out(d.decided, d.heldout._replace(gain=-5.0))
@@ -18,7 +18,7 @@ def test_a_name_that_predicts_worse_is_none():
     assert not worse.confidence
 
 
-def test_an_effect_whose_size_may_be_zero_is_not_told():
+def test_effect_compatible_with_size_zero_is_withdrawn():
     d = named()
     like, base, best = d.found.like, d.found.base, d.decided.best
     offset = next(h for h in hypotheses(like.sim, base.model) if h.name == "drive.offset:amplifier")
@@ -29,8 +29,8 @@ def test_an_effect_whose_size_may_be_zero_is_not_told():
     assert decided.why == "without drive.offset:amplifier, all is predicted as well"
 
 
-def test_what_stands_beside_an_idle_effect_alone_is_not_told():
-    """A sound machine's offset, which brings nothing on its own."""
+def test_effects_supported_only_together_are_withdrawn():
+    """Offset and spring of a nominal machine; the offset alone brings no evidence."""
     d = nothing()
     like, base = d.found.like, d.found.base
     names = ("drive.offset:motor", "load.spring:rod")

@@ -15,18 +15,18 @@ FINE = {**PENDULUM, "sensors": {"encoder": {**PENDULUM["sensors"]["encoder"], "c
 
 @cache
 def pushed(machine_is_fine):
-    """Fit of a pendulum on which a force acts that wanders at random."""
+    """Fit of a pendulum under a random-walk force."""
     u = command(4.0)
     wander = 0.05 * np.cumsum(np.random.default_rng(2).standard_normal(len(u))) / np.sqrt(len(u))
     like, space = together([record(case_of(FINE if machine_is_fine else PENDULUM), u, push=wander)])
     return refit(like, space)
 
 
-def test_a_fine_sensor_beside_a_force_that_wanders_is_followed_more_quickly():
+def test_fine_sensor_under_a_random_walk_force_gets_a_faster_observer():
     assert quicker(pushed(True)) >= 2.0
 
 
-def test_what_only_counts_is_not_followed_more_quickly():
+def test_coarse_sensor_keeps_the_default_observer():
     assert lags(pushed(True)) and not lags(nothing().found.best)
     fit = pushed(True)
     coarse = fit._replace(like=copy(fit.like))
@@ -34,18 +34,18 @@ def test_what_only_counts_is_not_followed_more_quickly():
     assert quicker(coarse) == 1.0
 
 
-def test_a_machine_as_described_is_followed_as_usual():
+def test_nominal_machine_keeps_the_default_observer():
     assert quicker(nothing().found.best) == 1.0
 
 
-def test_no_observer_is_quicker_than_the_ticks():
+def test_observer_bandwidth_is_limited_by_the_tick_rate():
     like = pushed(True).like
     sim = like.following(1e6).sim
     assert sim.follow == pytest.approx(0.25 / sim.record.dt)
     assert like.following(2.0).rows == like.rows
 
 
-def test_all_models_of_a_search_have_the_observer_that_it_ends_with(monkeypatch):
+def test_all_models_of_a_search_use_its_final_observer(monkeypatch):
     monkeypatch.setattr("rtctl.diagnose.search.search.quicker", lambda fit: 2.0)
     like, space = named().found.like, named().found.base.space
     found = search(like, space)

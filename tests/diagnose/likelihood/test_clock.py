@@ -12,12 +12,12 @@ from rtctl.diagnose.likelihood.fits import refit
 from rtctl.diagnose.likelihood.joint import together
 from rtctl.diagnose.model.recording import record_of
 
-OFF = 3e-4  # s, standard deviation of the ticks
+OFF = 3e-4  # s, standard deviation of the tick times
 COUNTS = 5000.0
 
 
 def read_at(u, late):
-    """Record of a sound pendulum that is read `late` (n,) s after each tick."""
+    """Record of a nominal pendulum, sampled `late` (n,) s after each tick."""
     case = case_of(PENDULUM)
     fine = {**case, "machine": {**PENDULUM, "sensors": {"encoder": {**PENDULUM["sensors"]["encoder"],
             "counts_per_unit": 1e6}}}}  # fmt: skip
@@ -38,18 +38,18 @@ def fitted(record):
     return refit(like, space)
 
 
-def test_ticks_off_their_times_are_measured():
+def test_clock_jitter_is_estimated():
     found = clock(fitted(unsteady()))
     assert found.sigma == pytest.approx(OFF, rel=0.1)
     assert found.low < found.sigma < found.high
     assert found.probability > 0.9
 
 
-def test_a_clock_as_any_other():
+def test_regular_clock_has_a_low_jitter_probability():
     assert clock(nothing().found.base).probability < 0.2
 
 
-def test_the_clock_is_named():
+def test_clock_jitter_is_named_with_its_size():
     d = diagnose_record(unsteady())
     assert d.verdict == "named"
     assert [(e.name, e.node) for e in d.effects] == [("timing.jitter", "loop")]
@@ -59,7 +59,7 @@ def test_the_clock_is_named():
     assert size.unit == "s" and size.low < OFF < size.high
 
 
-def test_commands_last_as_long_as_they_were_held():
+def test_commands_are_held_for_the_estimated_tick_times():
     fit = fitted(unsteady())
     told = timed(fit, clock(fit))
     before, after = fit.like.sim.volts, told.sim.volts

@@ -16,13 +16,13 @@ DRY = Hypothesis(RUB["term"], RUB["node"], (Coordinate("F_C", SIZE, 1.0, low=0.0
 
 @cache
 def problem():
-    """Likelihood and unknowns of a belt axis whose carriage rubs, and its base."""
+    """Likelihood, unknowns and base fit of a belt axis with extra dry friction."""
     like, space = together([record(case_of(BELT), command(0.6), [RUB])])
     return like, space, refit(like, space)
 
 
 class Flat:
-    """A problem that is linear: the residual is A x - b under white noise of one."""
+    """Linear problem: the residual is A x - b under white noise of unit variance."""
 
     def __init__(self, A, b):
         self.A, self.b, self.calls = A, b, 0
@@ -45,13 +45,13 @@ class Flat:
 
 
 class Cliff(Flat):
-    """The same, and beyond `edge` of an unknown either way, where one is given, the model runs away."""
+    """Linear problem whose model diverges where an unknown is above `up` or below `down`."""
 
     def __init__(self, A, b, up, down):
         super().__init__(A, b)
         self.up, self.down = up, down
 
-    coarsely = True  # whether a coarse simulation stays
+    coarsely = True  # False: coarse simulations diverge
 
     rough = Likelihood.rough
 
@@ -65,7 +65,7 @@ class Cliff(Flat):
 
 
 class Unknowns:
-    """Unknowns without a prior whose model is x itself."""
+    """Unknowns without a prior; the model is x."""
 
     nb, hypotheses = 0, (None,)
 
@@ -97,7 +97,7 @@ def linear(high=10.0):
     return Flat(A, A @ truth + 0.01 * rng.standard_normal(50)), Unknowns(4, high), truth
 
 
-def test_least_squares_of_a_linear_problem():
+def test_descent_solves_a_linear_problem():
     like, space, _ = linear()
     x = np.zeros(4)
     J = derivatives(like, space, x, range(4))
@@ -106,24 +106,26 @@ def test_least_squares_of_a_linear_problem():
     np.testing.assert_allclose(found.x, np.linalg.lstsq(like.A, like.b, rcond=None)[0], atol=1e-4)
 
 
-def test_no_columns_cost_no_simulation():
+def test_derivatives_of_no_columns_need_no_simulation():
     like, space, _ = linear()
     J = np.ones((50, 1, 4), np.float32)
     assert derivatives(like, space, np.zeros(4), [], J) is J
     assert like.calls == 0
 
 
-def test_derivatives_that_are_wrong_are_learned_or_taken_anew():
+def test_wrong_derivatives_are_corrected_during_the_descent():
     like, space, truth = linear()
     x = np.zeros(4)
     wrong = (like.A * np.array([0.5, 1.5, 1.0, 1.2]))[:, None, :].astype(np.float32)
     found = descend(like, space, Point(x, like.raw(x), wrong), 30, 1e-6)
     np.testing.assert_allclose(found.x, truth, atol=0.02)
     np.testing.assert_allclose(found.J[:, 0], like.A, atol=1e-3)
-    assert (wrong[:, 0] == (like.A * np.array([0.5, 1.5, 1.0, 1.2])).astype(np.float32)).all()  # not ours to change
+    assert (
+        wrong[:, 0] == (like.A * np.array([0.5, 1.5, 1.0, 1.2])).astype(np.float32)
+    ).all()  # the argument is unchanged
 
 
-def test_bounds_hold():
+def test_descent_respects_the_bounds():
     like, space, _ = linear(high=2.0)
     x = np.zeros(4)
     found = descend(like, space, Point(x, like.raw(x), derivatives(like, space, x, range(4)), ALL), 10, 1e-6)
@@ -132,7 +134,7 @@ def test_bounds_hold():
     np.testing.assert_allclose(found.x[:3], free, atol=1e-3)
 
 
-def test_a_fit_goes_on_from_the_derivatives_of_the_base():
+def test_fit_reuses_the_derivatives_of_the_base():
     like, space, base = problem()
     wider = space.add(DRY)
     start = np.append(base.x, 0.5)
@@ -151,7 +153,7 @@ def test_a_fit_goes_on_from_the_derivatives_of_the_base():
     assert further.x[-1] == pytest.approx(RUB["F_C"], rel=0.1)
 
 
-def test_derivatives_of_a_fit_are_those_of_where_it_is():
+def test_derivatives_of_a_fit_are_evaluated_at_its_solution():
     like, space, base = problem()
     f = refit(like, space.add(DRY), np.append(base.x, 0.5), base.J)
     there = derivatives(f.like, f.space, f.x, range(len(f.x)))
@@ -161,14 +163,14 @@ def test_derivatives_of_a_fit_are_those_of_where_it_is():
 
 
 @pytest.mark.parametrize(("up", "down", "known"), [(1e-9, -1.0, True), (1.0, -1e-9, True), (1e-9, -1e-9, False)])
-def test_no_derivative_is_taken_to_where_a_model_runs_away(up, down, known):
+def test_derivatives_avoid_points_where_the_model_diverges(up, down, known):
     A = np.arange(6.0).reshape(3, 2) + 1.0
     like = Cliff(A, np.zeros(3), up, down)
     J = derivatives(like, Unknowns(2), np.zeros(2), range(2))
     assert J[:, 0, :] == pytest.approx(A if known else 0.0 * A, rel=1e-5)
 
 
-def test_derivatives_are_fine_where_coarse_simulations_run_away():
+def test_derivatives_use_the_fine_step_where_coarse_simulations_diverge():
     A = np.arange(6.0).reshape(3, 2) + 1.0
     like = Cliff(A, np.zeros(3), 1.0, -1.0)
     like.coarsely = False

@@ -16,16 +16,16 @@ FORCES = ("inertia", "mass", "dry", "viscous", "stiffness", "damping", "gain")
 
 @cache
 def base():
-    """The base fit of a belt axis that is as described."""
+    """Base fit of a nominal belt axis."""
     like, space = together([record(case_of(BELT), command(0.6))])
     return refit(like, space)
 
 
-def test_a_fit_goes_back_along_what_the_recording_does_not_tell():
+def test_relaxed_fit_returns_to_the_prior_along_unobservable_directions():
     found = base()
     forces = [i for i, name in enumerate(found.space.names) if name.endswith(FORCES)]
     x = found.x.copy()
-    x[forces] = 0.07  # all forces and inertias: no position shows it
+    x[forces] = 0.07  # common factor of all forces and inertias: unobservable in positions
     e = found.like.raw(found.space.model(x))
     strayed = found._replace(x=x, e=e, loss=found.like.loss(e))
     assert strayed.loss == pytest.approx(found.loss, abs=8.0)
@@ -42,13 +42,13 @@ def test_every_unknown_has_a_prior():
 
 @cache
 def draft():
-    """A draft of dry friction in the recording of a belt axis that has more of it than is described."""
+    """Base and draft fit of dry friction, for a belt axis with extra dry friction."""
     like, space = together([record(case_of(BELT), command(0.6), [RUB])])
     alone = refit(like, space)
     return alone, refit(like, space.add(DRY), np.append(alone.x, 1.0), alone.J, draft=True)
 
 
-def test_a_draft_that_is_finished_is_as_good_as_a_fit():
+def test_finished_draft_has_the_evidence_of_a_full_fit():
     alone, rough = draft()
     whole = refit(alone.like, rough.space, np.append(alone.x, 1.0), alone.J, relax=False)
     done = finished(rough)
@@ -58,16 +58,16 @@ def test_a_draft_that_is_finished_is_as_good_as_a_fit():
     assert finished(done) is done
 
 
-def test_a_model_is_evaluated_under_its_own_noise_wherever_its_fit_began():
+def test_evaluation_of_a_model_does_not_depend_on_the_initial_noise_model():
     alone, rough = draft()
     at = Point(rough.x, rough.e, rough.J)
-    loud = evaluated(alone.like, rough.space, at)  # the noise of a model that lacks the effect
+    loud = evaluated(alone.like, rough.space, at)  # noise model without the effect
     quiet = evaluated(rough.like, rough.space, at)
     assert loud.loss == pytest.approx(quiet.loss, abs=1e-6)
     assert loud.log_evidence == pytest.approx(quiet.log_evidence, abs=1e-6)
 
 
-def test_a_law_that_is_exact_is_told_from_one_that_is_about_right():
+def test_exact_law_gets_a_smaller_law_error_than_an_approximate_law():
     _, rough = draft()
     exact = finished(rough)
     u = command(0.6)
@@ -77,7 +77,7 @@ def test_a_law_that_is_exact_is_told_from_one_that_is_about_right():
     about = refit(like, space.add(DRY), np.append(alone.x, 1.0), alone.J)
 
     def share(f):
-        """Error that its law is given, by the usual one."""
+        """Ratio of the fitted law error to the default law error."""
         return np.std(f.like.errors) / np.std(errors(f.like, f.space, f.x, f.e).laws)
 
     assert share(exact) < 0.2 * share(about)

@@ -22,7 +22,7 @@ CASE = case_of(SPRUNG, delay_samples=0.0, controller={"kind": "none"})
 
 
 def tones(t):
-    """A command (n,) that is smooth between the rows and begins at zero."""
+    """Command (n,), smooth between the rows, zero at the start."""
     rng = np.random.default_rng(4)
     waves = sum(np.sin(2 * np.pi * f * t + rng.uniform(0, 6)) for f in (3.0, 7.0, 19.0, 41.0))
     return waves * np.minimum(t / 0.5, 1.0)
@@ -30,7 +30,7 @@ def tones(t):
 
 @cache
 def recorded(smooth):
-    """A recording of one machine under the smooth command, or under the same held over each row."""
+    """Recording under the smooth command, or under the command held over each row."""
     fine = tones(np.arange(round(4.0 * RATE * FINER)) / (RATE * FINER))
     u = fine[::FINER]
     if not smooth:
@@ -41,21 +41,21 @@ def recorded(smooth):
 
 
 @pytest.mark.parametrize("smooth", [True, False])
-def test_a_command_is_taken_as_what_it_was(smooth):
+def test_smooth_and_held_commands_are_distinguished(smooth):
     like, space = together([recorded(smooth)])
     assert (likelier(like, space) is not like) == smooth
     told = suits(refit(like, space))
     assert (told is not None) == smooth
 
 
-def test_the_other_way_of_the_other_way_is_the_first():
+def test_switching_the_command_interpolation_twice_is_the_identity():
     like, _ = together([recorded(True)])
     there = other_way(like)
     assert not np.array_equal(there.sim.volts, like.sim.volts)
     assert np.array_equal(other_way(there).sim.volts, like.sim.volts)
 
 
-def test_what_a_controller_wrote_was_held():
+def test_command_of_a_controller_is_held():
     like, space = together([record(case_of(SPRUNG), recorded(True).u[:, 0])])
     assert other_way(like) is None and suits(refit(like, space)) is None
     assert likelier(like, space) is like

@@ -19,13 +19,13 @@ def both():
     return diagnose_record(rotor(1, 0), rotor(-1, 1))
 
 
-def test_one_way_alone_does_not_tell_friction_from_an_offset():
+def test_one_direction_does_not_separate_friction_from_an_offset():
     d = diagnose_record(rotor(1, 0))
     assert d.verdict == AMBIGUOUS
     assert {e.name for e in d.effects} == ONE_WAY
 
 
-def test_both_ways_together_do():
+def test_two_directions_together_separate_friction_from_an_offset():
     d = both()
     assert d.verdict == NAMED
     assert [(e.name, e.node) for e in d.effects] == [("friction.coulomb", "rotor")]
@@ -39,7 +39,7 @@ def test_report_names_both_recordings():
     assert "2 recordings of one machine: left and right" in html(both())
 
 
-def test_losses_add_up_and_residuals_are_stacked():
+def test_joint_loss_is_the_sum_and_joint_residual_is_stacked():
     like = both().found.like.slackened(None)
     model = both().decided.best.model
     e = like.raw(model)
@@ -54,7 +54,7 @@ def test_losses_add_up_and_residuals_are_stacked():
     assert len(early.raw(model)) + len(late.raw(model)) == pytest.approx(len(e), abs=2)
 
 
-def test_errors_of_a_law_are_shared_by_all_recordings():
+def test_law_errors_are_shared_by_all_recordings():
     like = both().found.like
     model = both().decided.best.model
     e = like.raw(model)
@@ -67,7 +67,7 @@ def test_errors_of_a_law_are_shared_by_all_recordings():
 
 @cache
 def loads():
-    """A pendulum with two loads, fitted together: the mass is each recording's own."""
+    """Joint fit of a pendulum with two loads; each recording has its own mass parameter."""
 
     def one(mass, believed, seed):
         u = 20.0 * torque(1, seed, 200.0, 4.0) * np.where(np.arange(800) % 100 < 50, 1.0, -1.0)
@@ -83,7 +83,7 @@ def loads():
     return refit(like, space)
 
 
-def test_a_load_that_differs_is_each_recordings_own():
+def test_per_recording_parameter_is_fitted_for_each_recording():
     f = loads()
     base = f.model.base
     assert base["bodies.rod.gravity.mass@load-0.5"] == pytest.approx(0.55, rel=0.01)
@@ -92,7 +92,7 @@ def test_a_load_that_differs_is_each_recordings_own():
     assert f.space.names.count("bodies.rod.inertia") == 1
 
 
-def test_a_config_has_the_numbers_of_its_recording():
+def test_config_has_the_parameters_of_its_recording():
     f = loads()
     first = f.like.sim.record
     machine = to_config(f.model, first)["machine"]
@@ -100,7 +100,7 @@ def test_a_config_has_the_numbers_of_its_recording():
     assert float(str(machine["bodies"]["rod"]["gravity"]["mass"]).split()[0]) == pytest.approx(mass, rel=1e-5)
 
 
-def test_what_nobody_declared_may_not_differ():
+def test_undeclared_parameter_difference_is_refused():
     other = {"bodies": {"rotor": {"inertia": 2e-3, "viscous": 5e-4}}}
     u = torque(1, 0)
     case = case_of({**ROTOR, **other}, 500.0)

@@ -14,11 +14,11 @@ from rtctl.diagnose.likelihood.noise import (
     whitened,
 )  # fmt: skip
 
-A = np.array([1.0, -1.5, 0.7])  # of a known process
+A = np.array([1.0, -1.5, 0.7])  # coefficients of the known process
 ALL = np.arange(20_000)
 
 
-def test_autoregression_of_a_known_process():
+def test_autoregression_recovers_a_known_process():
     e = lfilter([1.0], A, 0.02 * np.random.default_rng(1).standard_normal(20_000))
     found = noise_of(e, 2, 1e-9)
     np.testing.assert_allclose(found.a, A, atol=0.02)
@@ -29,22 +29,22 @@ def test_autoregression_of_a_known_process():
     assert abs(np.corrcoef(white[1:], white[:-1])[0, 1]) < 0.02
 
 
-def test_least_innovation():
+def test_innovation_level_has_a_lower_bound():
     assert noise_of(1e-6 * np.random.default_rng(1).standard_normal(1000), 3, 1e-3).sigma == 1e-3
 
 
-def test_a_constant_is_no_noise():
+def test_constant_offset_does_not_affect_the_noise_model():
     e = np.random.default_rng(2).standard_normal(4000)
     shifted = noise_of(e + 50.0, 4, 1e-9)
     np.testing.assert_allclose(shifted.a, noise_of(e, 4, 1e-9).a, atol=1e-9)
     assert shifted.filtered(e + 50.0).mean() > 10.0
 
 
-def test_order_of_a_short_residual():
+def test_short_residual_limits_the_autoregression_order():
     assert noise_of(np.random.default_rng(3).standard_normal(100), 20, 1e-9).order == 5
 
 
-def test_a_filter_is_the_sum_that_it_says():
+def test_filter_matches_a_direct_convolution():
     rng = np.random.default_rng(5)
     for taps, rows in ((1, 7), (3, 3), (4, 50), (21, 1000), (4, 6)):
         a, e = rng.standard_normal(taps), rng.standard_normal((rows, 2, 3))
@@ -54,19 +54,19 @@ def test_a_filter_is_the_sum_that_it_says():
     assert filtered(np.ones(4), np.ones((2, 3))).shape == (0, 3)
 
 
-def test_many_residuals_at_once():
+def test_filter_of_many_residuals_equals_single_filters():
     noise = Noise(A, 0.5)
     e = np.random.default_rng(4).standard_normal((50, 3))
     np.testing.assert_allclose(noise.filtered(e)[:, 1], noise.filtered(e[:, 1]))
 
 
-def test_no_columns_have_no_innovations():
+def test_filter_of_zero_columns_keeps_the_shape():
     noise = Noise(A, 0.5)
     assert noise.filtered(np.zeros((100, 0))).shape == (98, 0)
     assert noise.filtered(np.zeros((100, 3))).shape == (98, 3)
 
 
-def test_what_moves_two_sensors_counts_once():
+def test_common_force_of_two_sensors_counts_once():
     rng = np.random.default_rng(5)
     force = lfilter([1.0], A, rng.standard_normal(20_000))
     e = np.stack([force, np.roll(force, 1)], axis=1) + 0.1 * rng.standard_normal((20_000, 2))
@@ -81,9 +81,9 @@ def test_what_moves_two_sensors_counts_once():
     assert abs(np.corrcoef(first[len(first) - len(second) :], second)[0, 1]) < 0.02
 
 
-def test_what_another_foretells_takes_another_part_from_the_past():
-    """A ring that the first sensor foretells and a second one shows, with a slow wave of its own beside it or not: the
-    wave costs what it is, and the ring nothing."""
+def test_cross_prediction_adapts_the_autoregression_of_the_second_sensor():
+    """The first sensor predicts a ringing of the second sensor, with or without a slow wave in the second sensor:
+    only the wave raises the innovation level."""
     rng = np.random.default_rng(9)
     force = rng.standard_normal(20_000)
     ring = lfilter([1.0], [1.0, -1.95, 0.98], force)
@@ -97,14 +97,14 @@ def test_what_another_foretells_takes_another_part_from_the_past():
     assert left[0] < left[1] < 1.6 * left[0]
 
 
-def test_sensors_of_their_own_tell_nothing_of_each_other():
+def test_independent_sensors_have_no_cross_prediction():
     e = np.random.default_rng(6).standard_normal((20_000, 2))
     (_, two), _ = noises_of(e, [ALL, ALL], 4, np.full(2, 1e-9))
     assert np.abs(two.beside[0]).max() < 0.03
     np.testing.assert_allclose(two.sigma, 1.0, rtol=0.02)
 
 
-def test_a_sensor_that_shows_edges_now_and_then():
+def test_cross_prediction_of_a_sensor_with_sparse_rows():
     rng = np.random.default_rng(7)
     e = rng.standard_normal((20_000, 2))
     e[:, 1] = 0.8 * e[:, 0] + 0.6 * e[:, 1]
@@ -118,7 +118,7 @@ def test_a_sensor_that_shows_edges_now_and_then():
         np.testing.assert_allclose(one[:, 1], other)
 
 
-def test_noise_that_grows():
+def test_noise_level_that_grows_with_speed_is_estimated():
     rng = np.random.default_rng(8)
     square = rng.uniform(0.0, 4.0, 20_000) ** 2
     e = np.sqrt(0.04 + 0.09 * square) * rng.standard_normal(len(square))
@@ -132,7 +132,7 @@ def test_noise_that_grows():
     np.testing.assert_allclose(noise.averaged().sigma, e.std(), rtol=0.01)
 
 
-def test_noise_that_does_not_grow():
+def test_constant_noise_level_is_estimated_as_constant():
     rng = np.random.default_rng(9)
     square = rng.uniform(0.0, 4.0, 20_000) ** 2
     found = levels(rng.standard_normal(len(square)), square[:, None], 1e-9)

@@ -10,25 +10,25 @@ from rtctl.diagnose.search.hypotheses import hypotheses
 
 @pytest.fixture(scope="module")
 def pair():
-    """The description of the belt axis, and with dry friction, fitted to a recording with dry friction."""
+    """Fits of the nominal belt axis and of the axis with dry friction to a recording with dry friction."""
     like, space = together([record(case_of(BELT), command(0.6), [RUB])])
     base = refit(like, space)
     name = "friction.coulomb:carriage"
     return base, refit(like, space.add(next(h for h in hypotheses(like.sim, base.model) if h.name == name)))
 
 
-def test_an_effect_that_was_there_takes_off_what_is_missing(pair):
+def test_true_effect_explains_the_missing_share(pair):
     assert shown(*pair) > 0.9
 
 
-def test_a_model_with_the_residual_of_the_description_shows_nothing(pair):
+def test_model_with_the_residual_of_the_base_explains_nothing(pair):
     base, best = pair
     assert shown(base, base) == 0.0
     slightly = best._replace(e=base.e + 0.02 * (best.e - base.e), pushes=base.pushes)
     assert 0.0 < shown(base, slightly) < 0.1
 
 
-def test_noise_of_counting_is_not_missing(pair):
+def test_quantisation_noise_is_not_a_missing_share(pair):
     base, best = pair
     counted = np.full(base.e.shape, 1.0) * base.like.least * np.sqrt(base.like.mean)
     assert shown(base._replace(e=0.9 * counted), best._replace(e=0.8 * counted, pushes=base.pushes)) == 0.0

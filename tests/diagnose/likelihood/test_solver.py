@@ -1,4 +1,4 @@
-"""Steps of a fit: the bounded one against scipy's own, and work side by side."""
+"""Steps of a fit: the bounded step against scipy, and parallel jobs."""
 
 import numpy as np
 import pytest
@@ -30,7 +30,7 @@ def problems(draw):
 
 @settings(deadline=None, max_examples=60)
 @given(problems())
-def test_the_bounded_step_is_the_best_of_all_within_the_bounds(problem):
+def test_bounded_step_matches_scipy_lsq_linear(problem):
     J, r, x, low, high = problem
     size = np.linalg.norm(J, axis=0)
     assume(np.linalg.cond(J / size) < 1e3)
@@ -42,7 +42,7 @@ def test_the_bounded_step_is_the_best_of_all_within_the_bounds(problem):
         return 0.5 * float(np.sum((r + J @ dx) ** 2))
 
     best = lsq_linear(J, -r, (low - x, np.maximum(high - x, low - x + 1e-12)), method="bvls").x
-    assert cost(dx) <= cost(best) * (1 + 1e-6) + 1e-9 * (1 + cost(0 * dx))  # it is regularised by 1e-10
+    assert cost(dx) <= cost(best) * (1 + 1e-6) + 1e-9 * (1 + cost(0 * dx))  # regularisation of 1e-10
     np.testing.assert_allclose(size * dx, size * best, rtol=1e-4, atol=1e-4 * np.linalg.norm(r))
 
 
@@ -59,17 +59,17 @@ def test_damping_shortens_the_step(problem, damping):
     assert steps[1] >= steps[2] * (1 - 1e-6)
 
 
-def test_a_direction_that_nothing_shows_stays_where_it_is():
+def test_unobservable_direction_is_not_moved():
     H = np.diag([4.0, 0.0])
     dx = bounded_step(H, np.array([-4.0, 0.0]), np.zeros(2), np.full(2, -np.inf), np.full(2, np.inf), 0.0)
     np.testing.assert_allclose(dx, [1.0, 0.0], atol=1e-9)
 
 
-def test_errors_of_a_model_that_lacks_something_weigh_less_against_the_owner():
+def test_prior_weight_grows_with_the_level_of_unexplained_residuals():
     assert trust(np.full(10, 0.5)) == trust(np.ones(10))
     assert trust(np.full(10, 3.0)) == pytest.approx(9.0 * trust(np.ones(10)))
 
 
-def test_jobs_side_by_side_come_back_in_their_order():
+def test_parallel_jobs_return_in_order():
     assert [int(a[0]) for a in parallel([lambda i=i: np.array([i]) for i in range(7)])] == list(range(7))
     assert parallel([]) == []

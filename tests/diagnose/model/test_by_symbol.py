@@ -1,4 +1,4 @@
-"""What the owner believes, as a model: values, and what a recording gives of those that nobody says."""
+"""Nominal model of a case, with values estimated from the recording where the case has none."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from rtctl.diagnose.record.format1 import check
 from rtctl.plants.physics import TERMS
 
 
-def test_a_change_or_a_further_term_leaves_the_model_as_it_was():
+def test_change_and_add_do_not_modify_the_model():
     model = Model("axis", {"M": 1.0, "k": 2.0})
     offset = TERMS["drive.offset"].settings(node="drive", offset=0.1)
     assert model.change(M=3.0).base == {"M": 3.0, "k": 2.0}
@@ -19,8 +19,8 @@ def test_a_change_or_a_further_term_leaves_the_model_as_it_was():
     assert model == Model("axis", {"M": 1.0, "k": 2.0})
 
 
-def test_a_mass_spring_damper_of_which_nobody_says_anything_is_guessed_from_its_record():
-    """As in a recording of an oscillator driven open loop by noise."""
+def test_unknown_mass_spring_damper_is_estimated_from_its_record():
+    """Oscillator driven in open loop by a multisine."""
     case = read_case(
         {
             "plant": "axis", "sample_rate": 600.0, "parameters": {}, "drive": {"newton_per_volt": 1.0},
@@ -35,16 +35,16 @@ def test_a_mass_spring_damper_of_which_nobody_says_anything_is_guessed_from_its_
     record = at_rest(case, n, u=volts[:, None])
     true = {"M": 5e-6, "F_v": 2e-4, "k": 1.0, "K": 1.0, "F_c": 0.0}
     found = owner_model(case, record._replace(y=driven(record, Model("axis", true)))).base
-    for name, tolerance in (("M", 0.1), ("k", 0.1), ("F_v", 0.3)):  # to start a fit from
+    for name, tolerance in (("M", 0.1), ("k", 0.1), ("F_v", 0.3)):  # accuracy of a starting value
         assert found[name] == pytest.approx(true[name], rel=tolerance), name
 
 
-def test_an_axis_whose_mass_is_said_is_not_guessed(plain):
+def test_axis_with_a_given_mass_is_not_estimated(plain):
     assert owner_model(plain.record.case, plain.record).base == owner_model(plain.record.case).base
 
 
 @pytest.mark.parametrize(("given", "wanted"), [({"K": 2.0}, {"M": 1.0, "K": 2.0}), ({"M": 2.0}, {"M": 2.0, "K": 4.0})])
-def test_what_the_case_does_not_say_is_estimated_from_the_record(given, wanted):
+def test_missing_parameters_are_estimated_from_the_record(given, wanted):
     case = read_case({"plant": "axis", "sample_rate": 1000.0, "parameters": given, "controller": {"kind": "none"}}, ".")
     t = np.arange(4000) / 1000.0
     u = np.sin(2 * np.pi * 3 * t) + np.sin(2 * np.pi * 7 * t)
@@ -57,7 +57,7 @@ def test_what_the_case_does_not_say_is_estimated_from_the_record(given, wanted):
 
 
 @pytest.mark.parametrize("unit", ["m", "rad"])
-def test_a_recording_gives_the_ratio_of_mass_and_force_alone(blank, unit):
+def test_case_without_mass_and_force_constant_is_refused(blank, unit):
     record = blank("axis", np.sin(np.arange(2000.0)), np.cos(np.arange(2000.0)), parameters={}, drive={},
                    sensors={"unit": unit})  # fmt: skip
     noun = {"m": "the moving mass (kg)", "rad": "the moment of inertia (kg m^2)"}[unit]

@@ -1,4 +1,4 @@
-"""A Furuta pendulum with a concealed effect, recorded by an integrator of its own, is diagnosed by its mechanics."""
+"""Diagnosis of a Furuta pendulum with a concealed effect, simulated by scipy."""
 
 from pathlib import Path
 from typing import Any
@@ -17,11 +17,11 @@ from rtctl.diagnose.model.simulate import Simulator
 
 DT, SECONDS = 2e-3, 6.0
 M, R_ARM, D, J_ARM, J_ROD, K, OHM = 0.024, 0.085, 0.0645, 1.2e-4, 3.33e-5, 0.042, 8.4
-CREEP = 2e-3  # rad/s, below which the dry friction of the recording is a damper
+CREEP = 2e-3  # rad/s, width of the smoothed dry friction of the recording
 
 
 def recorded(more: float, u: np.ndarray) -> dict[str, np.ndarray]:
-    """Columns of a Furuta pendulum whose joint has `more` dry friction, Nm, than the description, by scipy."""
+    """Columns of a Furuta pendulum with the extra dry friction `more` (Nm) of the joint, integrated by scipy."""
     J = J_ROD + M * D * D
 
     def rates(t: float, z: np.ndarray) -> Any:
@@ -52,7 +52,7 @@ def columns():
     return recorded(4e-4, command(4.0, SECONDS))
 
 
-def test_every_body_that_no_joint_holds_is_followed(case, columns):
+def test_every_independent_body_is_tracked(case, columns):
     sim = Simulator(record_of(columns, read_case(case, Path("bundle")), Path("bundle")))
     assert [one.body for one in sim.followed] == ["arm", "pendulum"]
     assert sim.case.values["start.pendulum"] == 1.0 and "start.arm" not in sim.case.values
@@ -60,7 +60,7 @@ def test_every_body_that_no_joint_holds_is_followed(case, columns):
     assert push.shape == (len(columns["t"]), 2)
 
 
-def test_friction_of_the_joint_is_named_where_it_is(case, columns):
+def test_joint_friction_is_named_at_the_pendulum(case, columns):
     found = diagnose_record(record_of(columns, read_case(case, Path("bundle")), Path("bundle")))
     assert [(e.name, e.node) for e in found.effects] == [("friction.coulomb", "pendulum")]
     assert found.effects[0].parameters["F_C"].value == pytest.approx(4e-4, rel=0.25)

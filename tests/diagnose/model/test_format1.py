@@ -1,4 +1,4 @@
-"""Cases of format 1 for the judge of described machines."""
+"""Cases of format 1 in the diagnosis of described machines."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ CASE = {
 }  # fmt: skip
 
 
-def known():
+def known_record():
     t = np.arange(N) / RATE
     angle = 20.0 * np.sin(2 * np.pi * 0.4 * t)
 
@@ -40,8 +40,8 @@ def known():
     return graph_record(check(columns, read_case(CASE, "."), "."))
 
 
-def test_symbols_are_numbers_of_the_description():
-    case = known().case
+def test_symbols_set_the_parameters_of_the_description():
+    case = known_record().case
     assert case.values["joints.tape1.stiffness"] == 500.0
     assert case.values["bodies.reel2.reel.thickness"] == 1e-6
     assert case.values["drives.drive2.gain"] == 0.25
@@ -54,8 +54,8 @@ def test_symbols_are_numbers_of_the_description():
     assert case.called["bodies.motor1.dry"] == "tau_F1"
 
 
-def test_numbers_of_one_symbol_move_together():
-    case = known().case
+def test_parameters_of_one_symbol_change_together():
+    case = known_record().case
     both = ("bodies.reel1.reel.thickness", "bodies.reel2.reel.thickness")
     assert both[0] in case.fitted
     assert both[1] not in case.fitted
@@ -63,15 +63,15 @@ def test_numbers_of_one_symbol_move_together():
     assert model.base[both[0]] == model.base[both[1]] == pytest.approx(1e-6 * np.exp(0.05))
 
 
-def test_tape_turns_reels_by_their_radii():
-    case = known().case
+def test_tape_couples_the_reels_by_their_radii():
+    case = known_record().case
     ratios = rigid(case.layout, case.values, "capstan")
     assert ratios["motor1"] == pytest.approx(0.0125 / 0.036)
     assert ratios["reel2"] == pytest.approx(-0.0125 / 0.024)
 
 
-def test_edges_without_direction_are_told_by_the_model_that_follows_the_capstan():
-    record = known()
+def test_reel_edges_get_their_direction_from_the_tracked_capstan():
+    record = known_record()
     assert list(record.y) == ["encoder"]
     assert set(record.edges) == {"reel1", "reel2"}
     sim = Simulator(record)
@@ -79,17 +79,17 @@ def test_edges_without_direction_are_told_by_the_model_that_follows_the_capstan(
     assert told.channels == ["encoder", "reel1", "reel2"]
     for name, ratio in (("reel1", 0.0125 / 0.036), ("reel2", -0.0125 / 0.024)):
         off = told.record.y[name] - ratio * record.y["encoder"]
-        assert np.ptp(off) < 2.5 * told.record.grain[name]  # a count from edge to edge, and the first edge's place
+        assert np.ptp(off) < 2.5 * told.record.grain[name]  # quantisation and the position of the first edge
 
 
-def test_a_reel_without_an_edge_shows_nothing():
-    told = Simulator(known()).directed(nominal(known().case))
+def test_reel_without_edges_has_no_channel():
+    told = Simulator(known_record()).directed(nominal(known_record().case))
     still = told.record._replace(edges={name: np.zeros(len(told.record.t)) for name in told.record.edges})
     assert Simulator(still).directed(nominal(still.case)).channels == ["encoder"]
 
 
-def test_a_model_is_told_by_the_symbols_of_the_format(tmp_path):
-    record = known()
+def test_model_is_written_in_the_symbols_of_format_1(tmp_path):
+    record = known_record()
     source, path = record.source, "joints.tape1.stiffness"
     model = Space(nominal(record.case), (path,), record.case.tolerance).model(np.array([0.1]))
     term = TERMS["friction.coulomb"].settings(term="friction.coulomb", node="motor1", F_C=1e-3)
@@ -103,10 +103,10 @@ def test_a_model_is_told_by_the_symbols_of_the_format(tmp_path):
     assert again.terms[0].F_C == 1e-3
 
 
-def test_without_a_known_law_a_slow_one_stands_in():
-    record = known()
+def test_unknown_law_is_replaced_by_a_stand_in():
+    record = known_record()
     at = loop_of(record)
     assert not at.known
     assert at.sensor == "encoder"
-    assert at.give[0, 0] == -at.give[1, 0] == pytest.approx(0.5)  # one motor pulls either way
+    assert at.give[0, 0] == -at.give[1, 0] == pytest.approx(0.5)  # one motor per direction
     assert at.beside == pytest.approx(np.median(record.u, axis=0))

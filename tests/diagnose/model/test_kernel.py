@@ -1,4 +1,4 @@
-"""The generated simulation: its text holds every term, and a slot holds what a term needs."""
+"""Generated simulation: the source contains every term; a slot has the location and parameters of its term."""
 
 import ast
 
@@ -20,8 +20,8 @@ def functions() -> dict[str, ast.FunctionDef]:
     return {node.name: node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)}
 
 
-def numbers(function: ast.FunctionDef) -> set[int]:
-    """Kinds that a site asks for, without the empty slot."""
+def term_numbers(function: ast.FunctionDef) -> set[int]:
+    """Term numbers of a site, without the empty slot."""
     found = {
         node.comparators[0].value
         for node in ast.walk(function)
@@ -31,19 +31,19 @@ def numbers(function: ast.FunctionDef) -> set[int]:
 
 
 @pytest.mark.parametrize("site", SITES)
-def test_every_term_acts_at_its_sites(site):
+def test_every_term_is_called_at_its_sites(site):
     wanted = {i for i, t in enumerate(kernel.terms(), 1) if t.act_at(site, kernel.KIND) is not None}
-    assert numbers(functions()[site]) == wanted
+    assert term_numbers(functions()[site]) == wanted
 
 
-def test_no_term_is_left_out():
-    acting = set().union(*(numbers(functions()[site]) for site in SITES))
+def test_kernel_contains_all_terms():
+    acting = set().union(*(term_numbers(functions()[site]) for site in SITES))
     assert acting == set(range(1, len(kernel.terms()) + 1))
     assert {term.name for term in kernel.terms()} == {name for name, term in TERMS.items() if term.act}
 
 
 @pytest.mark.parametrize("closed", [False, True])
-def test_the_text_calls_only_what_its_modules_have(closed):
+def test_generated_source_calls_only_existing_functions(closed):
     tree = ast.parse(kernel.source(closed=closed))
     modules = {}
     for node in tree.body:
@@ -56,11 +56,11 @@ def test_the_text_calls_only_what_its_modules_have(closed):
             assert hasattr(modules[node.value.id], node.attr), f"{node.value.id}.{node.attr}"
 
 
-def test_no_placeholder_is_left_in_the_text():
+def test_generated_source_has_no_placeholder():
     assert "{" not in kernel.source().replace("{}", "")
 
 
-def test_a_slot_holds_place_and_params_of_its_term():
+def test_slot_has_location_and_parameters_of_its_term():
     k, machine = kernel.kernel(), layout(Description.model_validate(BELT))
     values = dict(machine.machine.paths())
     drive = next(iter(machine.machine.drives))
@@ -73,7 +73,7 @@ def test_a_slot_holds_place_and_params_of_its_term():
     assert slot["drive_offset"]["offset"] == 0.25
 
 
-def test_the_same_sources_give_the_same_module():
+def test_equal_sources_give_the_cached_module():
     assert kernel.sources_hash() == kernel.sources_hash()
     assert kernel.sources_hash() != kernel.sources_hash(closed=True)
     assert kernel.kernel() is kernel.kernel()

@@ -1,4 +1,4 @@
-"""The closed loop of a described machine against the loop that the daemon runs."""
+"""Simulated closed loop of a described machine against the loop of the daemon."""
 
 import numpy as np
 from graph_cases import at_rest
@@ -14,7 +14,7 @@ from rtctl.loop import fused
 SECONDS = 2.0
 
 
-def test_it_is_the_loop_of_the_tick():
+def test_simulated_loop_matches_the_loop_of_the_daemon():
     config = set_path(load_config("machines/belt", []), "loop.mode", "fused")
     run = fused.run(config, SECONDS + 0.5)
     rows = run.between(0.0, SECONDS)

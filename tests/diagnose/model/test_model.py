@@ -1,4 +1,4 @@
-"""Motion and inertia of all that a joint carries, against closed forms."""
+"""Motion and reflected inertia of jointed bodies, against closed forms."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from rtctl.diagnose.model.stand_in import lowest_mode
 
 @pytest.mark.parametrize("stiffness", [4e4, None])
 @pytest.mark.parametrize(("main", "inertia"), [("motor", 4e-5 + 1.5 * 0.0127**2), ("carriage", 1.5 + 4e-5 / 0.0127**2)])
-def test_inertia_is_that_of_all_that_joints_carry(main, inertia, stiffness):
+def test_moved_inertia_includes_all_jointed_bodies(main, inertia, stiffness):
     joint = BELT["joints"]["belt"] if stiffness else {"from": "motor", "to": "carriage", "ratio": 0.0127}
     model = nominal(read_case(case_of({**BELT, "joints": {"belt": joint}}), "bundle"))
     moved = carried(model.layout, model.base, rigid(model.layout, model.base, main))
@@ -19,14 +19,14 @@ def test_inertia_is_that_of_all_that_joints_carry(main, inertia, stiffness):
     assert moved_inertia(model.params(1e-3).inertia, moved) == pytest.approx(inertia)
 
 
-def test_lowest_mode_is_that_of_the_belt():
+def test_lowest_mode_matches_the_belt_mode():
     """w^2 = k (n^2 / J + 1 / m)."""
     model = nominal(read_case(case_of(BELT), "bundle"))
     hertz = np.sqrt(4e4 * (0.0127**2 / 4e-5 + 1.0 / 1.5)) / (2 * np.pi)
     assert lowest_mode(model.layout.machine, model.params(1e-3)) == pytest.approx(hertz, rel=1e-6)
 
 
-def test_the_terms_that_remain_keep_their_numbers():
+def test_removing_a_known_term_keeps_the_parameters_of_the_others():
     known = [{"term": "friction.coulomb", "node": "carriage", "F_C": F} for F in (1.0, 2.0, 3.0)]
     model = nominal(read_case(case_of(BELT, physics=known), "bundle"))
     rest = model.without_known(1)

@@ -1,4 +1,4 @@
-"""The law that a case of format 2 says, against recordings of the emulated belt axis under its PD law."""
+"""Law of a case of format 2, against recordings of the emulated belt axis under PD control."""
 
 import numpy as np
 import pytest
@@ -10,41 +10,41 @@ from rtctl.diagnose.answer.freerun import compare
 from rtctl.diagnose.model.loop_of import loop_of
 from rtctl.diagnose.model.owner_law import law_agreement, recomputed
 
-STEP = 20.0 / 2**16  # V, of the emulated converter
+STEP = 20.0 / 2**16  # V, step of the emulated converter
 
 
-def told(record):
-    """The warning that the recorded command is the input; "" for none."""
+def open_loop_warning(record):
+    """Warning that the recorded command is the input; "" without a warning."""
     return next((warning for warning in record.case.warnings if INPUT in warning), "")
 
 
-def test_the_recorded_command_is_recomputed_to_the_step_of_its_converter():
+def test_recorded_command_is_recomputed_within_a_converter_step():
     record = bundle(law())
-    assert told(record) == ""
+    assert open_loop_warning(record) == ""
     assert np.abs(recomputed(record, record.case.controller) - record.u[:, 0]).max() <= 0.51 * STEP
     assert np.ptp(record.u) > 1.0
     around = loop_of(record)
     assert (around.known, around.sensor, around.unit, around.limit) == (True, "encoder", "rad", 10.0)
 
 
-def test_a_wrong_derivative_is_seen():
+def test_wrong_derivative_gain_is_detected():
     record = bundle(law(D=0.5 * law()["D"]))
     assert record.case.controller is None and not loop_of(record).known
-    assert "belt: the law 'pd' does not give the recorded command (off by" in told(record)
+    assert "belt: the law 'pd' does not give the recorded command (off by" in open_loop_warning(record)
 
 
-def test_gains_and_reference_may_be_in_units_of_the_column():
+def test_gains_and_reference_in_column_units_are_converted():
     scale = belt()[0].machine.sensors["encoder"].scale
     said = law(P=law()["P"] / scale, D=law()["D"] / scale, units="column")
     record, plain = bundle(said, ref=scale * np.array(belt()[1]["ref"])), bundle(law())
-    assert told(record) == ""
+    assert open_loop_warning(record) == ""
     np.testing.assert_allclose(record.ref, plain.ref, atol=1e-12)
     again, wanted = (recomputed(r, r.case.controller) for r in (record, plain))
     np.testing.assert_allclose(again, wanted, atol=1e-6)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_sections_and_cascade_are_those_of_format_1(sign):
+def test_sections_and_cascade_laws_of_format_1_are_recomputed(sign):
     config, rows = belt()
     scale = config.machine.sensors["encoder"].scale
     x, dt = np.array(rows["encoder_counts"]) / scale, 1.0 / config.loop.rate
@@ -61,14 +61,14 @@ def test_sections_and_cascade_are_those_of_format_1(sign):
     assert law_agreement(record, record.case.controller).exact
 
 
-def test_a_free_run_closes_the_loop():
+def test_free_run_closes_the_loop_with_the_law_of_the_case():
     record = bundle(law())
     result = compare(record)
     assert result.closed
     assert result.channels["encoder"].nrmse < 0.02 and result.channels["amplifier"].nrmse < 0.1
 
 
-def test_a_law_may_read_a_sensor_that_is_not_followed_and_began_elsewhere():
+def test_law_may_use_an_untracked_sensor_with_an_offset():
     config, rows = belt()
     scale = config.machine.sensors["scale"].scale
     x = np.array(rows["scale_counts"]) / scale
@@ -82,18 +82,18 @@ def test_a_law_may_read_a_sensor_that_is_not_followed_and_began_elsewhere():
     assert np.abs(one - two).max() < 0.02 * np.ptp(one)
 
 
-def test_without_a_reference_the_loop_stays_open():
+def test_recording_without_a_reference_stays_in_open_loop():
     record = bundle(law(), ref=None)
-    assert "cannot be recomputed from this recording, which has no reference in every row" in told(record)
+    assert "cannot be recomputed from this recording, which has no reference in every row" in open_loop_warning(record)
     with pytest.raises(UserError, match=r"the loop cannot be closed: belt: the law 'pd' cannot be recomputed"):
         compare(record, closed=True)
 
 
-def test_a_drive_that_the_law_does_not_command_has_to_hold_its_command():
+def test_drive_outside_the_law_must_have_a_constant_command():
     brake = {"brake": {"body": "carriage", "column": "b", "kind": "force", "unit": "N"}}
     n = len(belt()[1]["t"])
     held = bundle(law(drive="amplifier"), brake, b=np.full(n, 0.25))
-    assert told(held) == "" and list(loop_of(held).beside) == [0.0, 0.25]
+    assert open_loop_warning(held) == "" and list(loop_of(held).beside) == [0.0, 0.25]
     moved = bundle(law(drive="amplifier"), brake, b=np.linspace(0.0, 1.0, n))
-    assert "it commands amplifier, and the command of brake changes as well" in told(moved)
+    assert "it commands amplifier, and the command of brake changes as well" in open_loop_warning(moved)
     assert moved.case.controller is None

@@ -14,11 +14,11 @@ COUNTS = np.round(3000 * np.sin(np.arange(N) / 20))
 COLUMNS = {"t": np.arange(N) / RATE, "u": np.sin(np.arange(N) / 9), "rod_counts": COUNTS}
 
 
-def of(columns, case=None):
+def record_from(columns, case=None):
     return record_of(columns, read_case(case or case_of(PENDULUM), "bench"), Path("bench/recording.parquet"))
 
 
-def test_bundle_in_si(tmp_path):
+def test_bundle_is_read_in_si_units(tmp_path):
     record = load(write_bundle(tmp_path / "bench", case_of(PENDULUM), COLUMNS))
     assert record.dt == 1 / RATE
     assert record.u.shape == (N, 1)
@@ -27,27 +27,27 @@ def test_bundle_in_si(tmp_path):
     assert record.main == "encoder"
 
 
-def test_a_counter_that_wraps_is_one_way():
+def test_wrapping_counter_is_unwrapped():
     way = np.round(np.linspace(0, 100_000, N))
-    record = of({**COLUMNS, "rod_counts": (way + 32768) % 65536 - 32768})
+    record = record_from({**COLUMNS, "rod_counts": (way + 32768) % 65536 - 32768})
     np.testing.assert_allclose(np.diff(record.y["encoder"]), np.diff(way) / 5000.0)
 
 
-def test_a_sensor_beside_the_first_may_be_absent():
-    record = of({"t": COLUMNS["t"], "u": COLUMNS["u"], "encoder_counts": COUNTS}, case_of(BELT))
+def test_secondary_sensor_may_be_absent():
+    record = record_from({"t": COLUMNS["t"], "u": COLUMNS["u"], "encoder_counts": COUNTS}, case_of(BELT))
     assert list(record.y) == ["encoder"]
 
 
-def test_uneven_times_are_laid_on_an_even_clock():
+def test_uneven_times_are_resampled_to_an_even_clock():
     t = COLUMNS["t"] + 2e-4 * np.sin(np.arange(N))
-    record = of({**COLUMNS, "t": t}, case_of(PENDULUM) | {"sample_rate": None})
+    record = record_from({**COLUMNS, "t": t}, case_of(PENDULUM) | {"sample_rate": None})
     np.testing.assert_allclose(np.diff(record.t), record.dt)
     np.testing.assert_allclose(record.u[:, 0], np.interp(record.t, t, COLUMNS["u"]))
 
 
 def test_measured_inputs_act_on_their_body():
     case = case_of(PENDULUM, inputs={"wind": {"body": "rod", "column": "load", "per_unit": 10.0}})
-    record = of({**COLUMNS, "load": np.full(N, 5.0)}, case)
+    record = record_from({**COLUMNS, "load": np.full(N, 5.0)}, case)
     np.testing.assert_allclose(record.forces, 0.5)
 
 
@@ -63,41 +63,41 @@ def test_measured_inputs_act_on_their_body():
         ({"t": np.arange(N) / 400.0}, UserError, "sample_rate in case.json is 500 Hz"),
     ],
 )
-def test_refusals(change, kind, sentence):
+def test_invalid_columns_are_refused(change, kind, sentence):
     columns = {name: values for name, values in {**COLUMNS, **change}.items() if values is not None}
     with pytest.raises(kind) as error:
-        of(columns)
+        record_from(columns)
     assert sentence in str(error.value)
 
 
-def test_too_few_rows():
+def test_too_few_rows_have_no_answer():
     case = case_of(PENDULUM)
     least = len(read_case(case, "bench").fitted) + 10
     with pytest.raises(
         NoAnswer, match=f"holds {least - 1} rows; {least - 10} unknown numbers and the noise need {least}"
     ):
-        of({name: values[: least - 1] for name, values in COLUMNS.items()}, case)
+        record_from({name: values[: least - 1] for name, values in COLUMNS.items()}, case)
 
 
-def test_a_drive_acts_where_it_is_on():
+def test_drive_acts_only_while_enabled():
     case = case_of(PENDULUM)
     motor = {**PENDULUM["drives"]["motor"], "enabled": "torque_on"}
     case["machine"] = {**PENDULUM, "drives": {"motor": motor}}
     on = np.where(np.arange(N) < 120, 1.0, 0.0)
-    np.testing.assert_array_equal(of({**COLUMNS, "torque_on": on}, case).u[:, 0], COLUMNS["u"] * on)
+    np.testing.assert_array_equal(record_from({**COLUMNS, "torque_on": on}, case).u[:, 0], COLUMNS["u"] * on)
     with pytest.raises(UserError, match=r"column 'torque_on', row 120: 0\.5; it should be 0"):
-        of({**COLUMNS, "torque_on": np.where(on > 0, 1.0, 0.5)}, case)
+        record_from({**COLUMNS, "torque_on": np.where(on > 0, 1.0, 0.5)}, case)
 
 
-def test_edges_alone_are_refused():
+def test_sensors_without_direction_alone_are_refused():
     case = case_of(PENDULUM)
     blind = {**PENDULUM["sensors"]["encoder"], "direction": False}
     case["machine"] = {**PENDULUM, "sensors": {"encoder": blind}}
     with pytest.raises(NoAnswer, match="no sensor tells a direction"):
-        of(COLUMNS, case)
+        record_from(COLUMNS, case)
 
 
-def test_a_sensor_that_looks_through_a_tape_is_not_the_main_one():
+def test_sensor_behind_a_tape_is_not_the_main_sensor():
     machine = {
         "bodies": {"reel": {"inertia": 1e-4, "radius": 0.03}, "capstan": {"inertia": 1e-4, "radius": 0.0125}},
         "joints": {
@@ -111,4 +111,4 @@ def test_a_sensor_that_looks_through_a_tape_is_not_the_main_one():
         },
     }  # fmt: skip
     columns = {**COLUMNS, "image": 1e-5 * COUNTS, "counts": COUNTS}
-    assert of(columns, case_of(machine)).main == "counter"
+    assert record_from(columns, case_of(machine)).main == "counter"

@@ -9,9 +9,9 @@ from rtctl.diagnose.model.simulate import Simulator
 FREE = {**PENDULUM, "bodies": {"rod": {"inertia": 9.8e-3, "gravity": {"mass": 0.28, "arm": 0.17, "angle": 0.0}}}}
 
 
-def test_period_of_a_free_pendulum():
+def test_free_pendulum_has_its_closed_form_period():
     sim = Simulator(blank(case_of(FREE), np.zeros(2000)))
-    sim.seen = np.full(2000, 0.05)  # where it begins
+    sim.seen = np.full(2000, 0.05)  # initial position
     angle = sim.run(nominal(sim.case), OPEN)[:, 0]
     crossings = np.flatnonzero((angle[1:] < 0.0) & (angle[:-1] >= 0.0))
     at = crossings + angle[crossings] / (angle[crossings] - angle[crossings + 1])
@@ -24,10 +24,10 @@ def test_friction_stops_a_pendulum():
     sim.seen = np.full(6000, 0.5)
     angle = sim.run(nominal(sim.case), OPEN)[:, 0]
     assert np.ptp(angle[-500:]) < 1e-6
-    assert abs(angle[-1]) < 5e-3 / (0.28 * 9.80665 * 0.17)  # inside the band that dry friction holds
+    assert abs(angle[-1]) < 5e-3 / (0.28 * 9.80665 * 0.17)  # within the band of dry friction
 
 
-def test_tracking_shows_a_constant_force_in_its_size():
+def test_tracking_correction_equals_a_constant_force():
     u = command(4.0)
     shown = record(case_of(PENDULUM), u, push=np.full(len(u), 0.08))
     sim = Simulator(shown)
@@ -35,7 +35,7 @@ def test_tracking_shows_a_constant_force_in_its_size():
     np.testing.assert_allclose(np.median(push[500:]), 0.08, rtol=0.03)
 
 
-def test_correction_of_a_true_model_is_small():
+def test_tracking_correction_of_the_true_model_is_small():
     u = command(4.0)
     sim = Simulator(record(case_of(PENDULUM), u))
     out, push = sim.everything(nominal(sim.case))
@@ -43,7 +43,7 @@ def test_correction_of_a_true_model_is_small():
     assert np.std(out[200:, 0] - sim.seen[200:]) < 1 / 5000.0
 
 
-def test_a_released_run_is_free_from_its_row():
+def test_released_run_has_no_correction_after_its_row():
     u = command(4.0)
     sim = Simulator(record(case_of(PENDULUM), u, push=np.full(len(u), 0.08))).released(1000)
     out, push = sim.everything(nominal(sim.case))
@@ -51,7 +51,7 @@ def test_a_released_run_is_free_from_its_row():
     assert np.abs(out[-1, 0] - sim.seen[-1]) > 0.01
 
 
-def test_a_model_that_runs_away_is_nan_from_there():
+def test_divergent_model_gives_nan():
     sim = Simulator(blank(case_of(FREE), np.zeros(500)))
     sim.seen = np.zeros(500)
     sim = sim.pushed(np.full((500, 1), 1e17))
@@ -59,14 +59,14 @@ def test_a_model_that_runs_away_is_nan_from_there():
     assert np.isnan(out[-1, 0])
 
 
-def test_a_command_acts_after_its_delay():
+def test_command_acts_after_its_delay():
     case = case_of(FREE) | {"delay_samples": 3.0}
     sim = Simulator(blank(case, np.where(np.arange(60) >= 20, 1.0, 0.0)))
     moved = np.flatnonzero(sim.run(nominal(sim.case), OPEN)[:, 0])
-    assert moved[0] == 24  # 20 of the step, 3 of the delay, and the row that shows it
+    assert moved[0] == 24  # 20 rows before the step, 3 rows of delay, 1 row of response
 
 
-def test_a_term_acts_at_its_node():
+def test_term_acts_at_its_node():
     u = command(0.6)
     case = case_of(BELT)
     sim = Simulator(blank(case, u))
@@ -76,17 +76,17 @@ def test_a_term_acts_at_its_node():
     assert np.ptp(held[:, 1]) < 0.8 * np.ptp(free[:, 1])
 
 
-def test_ratios_of_rigid_joints():
+def test_rigid_ratios_of_a_belt():
     case = blank(case_of(BELT), np.zeros(100)).case
     assert rigid(case.layout, case.values, "motor") == {"motor": 1.0, "carriage": 0.0127}
     assert rigid(case.layout, case.values, "carriage")["motor"] == pytest.approx(1 / 0.0127)
 
 
-def test_a_held_body_follows_without_breaking_loose():
+def test_sticking_body_tracks_a_displacement_without_breaking_away():
     case = case_of(PENDULUM)
     stiff = {**case, "machine": {**PENDULUM, "bodies": {"rod": {"inertia": 9.8e-3, "dry": 0.5}}}}
     made = blank(stiff, np.zeros(1000))
-    y = np.where(np.arange(1000) < 300, 0.0, 0.02)  # it was moved by hand and rests again, far below what lets it go
+    y = np.where(np.arange(1000) < 300, 0.0, 0.02)  # displaced by hand, at rest below break-away
     sim = Simulator(made._replace(y={"encoder": y}))
     out, push = sim.everything(nominal(made.case))
     assert abs(out[-1, 0] - 0.02) < 1e-4

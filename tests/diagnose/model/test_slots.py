@@ -1,4 +1,4 @@
-"""Slots of the compiled simulation: the layout of their params, and the text of a site."""
+"""Slots of the compiled simulation: layout of the params, and source of a site."""
 
 import pytest
 
@@ -8,8 +8,8 @@ from rtctl.plants.physics import TERMS, anywhere
 
 
 @pytest.mark.parametrize("term", TERMS.values(), ids=lambda t: t.name)
-def test_sample_params_have_the_layout_of_any_other(term):
-    """A slot is laid out from a sample: a term whose layout hangs on its values would not fit in it."""
+def test_params_layout_does_not_depend_on_the_values(term):
+    """The layout of a slot comes from sample params; all params of a term must have the layout."""
     given = {"node": next(iter(anywhere(term).values()))[-1]}
     for name, info in term.settings.model_fields.items():
         if info.is_required() and name != "node":
@@ -18,6 +18,6 @@ def test_sample_params_have_the_layout_of_any_other(term):
         assert record_dtype(slots.sample(term)) == record_dtype(term.build(term.settings(**given), h))
 
 
-def test_a_site_without_a_term_asks_for_no_number():
+def test_site_without_terms_has_one_comparison():
     text = slots.at_site("command", "described", ())
     assert "kind == 0" in text and text.count("kind ==") == 1

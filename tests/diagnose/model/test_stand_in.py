@@ -1,4 +1,4 @@
-"""The law that keeps a machine on a motion where its own is not known."""
+"""Stand-in law for machines with an unknown law."""
 
 import numpy as np
 from graph_cases import at_rest
@@ -12,7 +12,7 @@ from rtctl.diagnose.model.simulate import Simulator
 SECONDS = 2.0
 
 
-def test_without_a_config_the_law_is_a_stand_in():
+def test_record_without_a_config_gets_a_stand_in_law():
     record = at_rest(load_config("machines/belt", []), SECONDS)
     bare = record._replace(case=record.case._replace(config=None))
     at = loop_of(bare)

@@ -10,19 +10,19 @@ from rtctl.diagnose.record.columns import even_clock, laid, running, through_amp
     "state, rows",
     [([0, 1, 2, 2, 3], (2, 4)), ([2, 2], (0, 2)), ([2, 0, 2, 2, 0], (2, 4)), ([0, 1, 1], (0, 0)), ([], (0, 0))],
 )
-def test_rows_in_which_our_own_loop_ran(state, rows):
+def test_running_rows_are_selected_by_state(state, rows):
     found = running(np.array(state))
     assert (found.start, found.stop) == rows
 
 
-def test_the_measured_amplifier_in_volts():
+def test_amplifier_characteristic_of_the_thesis():
     u = np.array([-2.8, -0.0, 0.0, 0.5, 0.8, 2.8])
     assert 0.1 * through_amplifier(u) == pytest.approx([-0.242, -0.042, 0.042, 0.042, 0.042, 0.242])  # A, (12.3)
 
 
 @settings(deadline=None, max_examples=60)
 @given(st.sampled_from([16, 24, 32]), st.lists(st.integers(-900, 900), min_size=3, max_size=300), st.integers(0, 2**31))
-def test_a_counter_that_wraps_is_unwrapped(bits, steps, start):
+def test_wrapping_counter_is_unwrapped(bits, steps, start):
     true = start + np.concatenate(([0], np.cumsum(steps)))
     wrapped = (true % 2**bits).astype(float)
     counts, found, wraps = unwrap(wrapped)
@@ -32,12 +32,12 @@ def test_a_counter_that_wraps_is_unwrapped(bits, steps, start):
         assert found == bits
 
 
-def test_a_wide_range_and_a_single_jump_are_no_wrap():
+def test_wide_range_and_single_jump_are_not_a_wrap():
     assert unwrap(np.array([0.0, 30000.0, 70000.0, 20.0]))[1] is None
     assert unwrap(np.array([0.0, 1.0, 2.0, 40000.0, 40001.0]))[1] is None
 
 
-def test_uneven_rows_are_laid_onto_an_even_clock():
+def test_uneven_rows_are_resampled_to_an_even_clock():
     t = np.array([0.0, 0.9, 2.1, 3.0]) * 1e-3
     even = even_clock(t, 1e-3)
     assert even == pytest.approx([0.0, 1e-3, 2e-3, 3e-3])

@@ -14,7 +14,7 @@ from rtctl.trace.bundle import load_case, save_case
 
 @pytest.fixture
 def columns_of():
-    """`columns_of("ivu", n, rate)`: columns of a machine that moves to and fro, with commands of both signs."""
+    """`columns_of("ivu", n, rate)`: columns of a reciprocating machine, with commands of both signs."""
 
     def make(plant, n=2000, rate=500.0, sweep=2.0):
         rng = np.random.default_rng(3)
@@ -55,7 +55,7 @@ def bundle_of(tmp_path):
 
 
 def law_in_force(folder):
-    """Write what the case's own law gives into the commands of the bundle."""
+    """Replace the commands of the bundle by the output of the law of the case."""
     record = load_record(folder)
     u = recompute_law(record)
     columns = {**record.columns, **{name: u[:, d] for d, name in enumerate(record.commands)}}
@@ -67,7 +67,7 @@ RATES = {"ivu": 500.0, "ldu": 1000.0, "axis": 1000.0}
 
 
 @pytest.fixture
-def good(bundle_of, columns_of):
+def bundle_of_kind(bundle_of, columns_of):
     def make(kind, **changes):
         return bundle_of(columns_of(kind, 3000, RATES[kind]), case_of(kind, **changes), kind + str(len(changes)))
 
@@ -75,8 +75,8 @@ def good(bundle_of, columns_of):
 
 
 @pytest.mark.parametrize("kind", ["ivu", "ldu", "axis"])
-def test_reads_a_bundle_whose_law_is_recomputed(good, kind):
-    record = law_in_force(good(kind))
+def test_bundle_with_a_recomputed_law_is_in_closed_loop(bundle_of_kind, kind):
+    record = law_in_force(bundle_of_kind(kind))
     assert record.closed_loop
     assert law_agreement(record).exact
     assert record.u.shape == (3000, 2 if kind == "ivu" else 1)
@@ -85,8 +85,8 @@ def test_reads_a_bundle_whose_law_is_recomputed(good, kind):
 
 
 @pytest.mark.parametrize("allocation", ["pull", "differential", "motor1", "motor2"])
-def test_the_law_of_the_two_reels_row_by_row(good, allocation):
-    folder = good("ivu", controller__allocation=allocation, controller__friction_Nm=0.0024)
+def test_law_of_the_two_reel_unit_matches_a_row_by_row_calculation(bundle_of_kind, allocation):
+    folder = bundle_of_kind("ivu", controller__allocation=allocation, controller__friction_Nm=0.0024)
     record = load_record(folder)
     u, again = recompute_law(record), []
     c = record.columns
@@ -111,8 +111,8 @@ def test_the_law_of_the_two_reels_row_by_row(good, allocation):
     assert np.all(u / (20 / 4096) == np.round(u / (20 / 4096)))
 
 
-def test_a_voltage_half_way_between_two_steps_goes_up(good):
-    folder = good("ldu", controller__sections=[[0.0, 0.0, 0.0, 0.0, 0.0]])
+def test_voltage_between_two_converter_steps_is_rounded_up(bundle_of_kind):
+    folder = bundle_of_kind("ldu", controller__sections=[[0.0, 0.0, 0.0, 0.0, 0.0]])
     record = load_record(folder)
     step = 20 / 4096
     w = np.array([0.5, -0.5, 1.5, -1.5, 700.0, -700.0]) * step
@@ -120,16 +120,16 @@ def test_a_voltage_half_way_between_two_steps_goes_up(good):
     assert (u[:6, 0] / step).tolist() == [1, 0, 2, -1, 614, -614]
 
 
-def test_a_law_that_was_not_in_force_is_left(good):
-    record = load_record(good("ldu"))
+def test_law_that_does_not_reproduce_the_command_is_dropped(bundle_of_kind):
+    record = load_record(bundle_of_kind("ldu"))
     assert not record.case.controller_known
     assert not record.closed_loop
     assert "row" in record.case.warnings[-1]
     assert "lead_lag" in record.case.warnings[-1]
 
 
-def test_a_start_that_nobody_saw_does_not_spoil_a_law(good):
-    folder = good("axis")
+def test_deviation_in_the_first_row_keeps_the_law(bundle_of_kind):
+    folder = bundle_of_kind("axis")
     record = law_in_force(folder)
     columns = dict(record.columns)
     columns["u"] = columns["u"].copy()
@@ -141,7 +141,7 @@ def test_a_start_that_nobody_saw_does_not_spoil_a_law(good):
     assert law_agreement(again).worst_row == 0
 
 
-def test_a_reference_that_nobody_knows(bundle_of, columns_of):
+def test_unknown_reference_is_allowed_only_with_an_unknown_law(bundle_of, columns_of):
     columns = {**columns_of("axis", 3000, 1000.0), "ref": np.full(3000, np.nan)}
     case = case_of("axis", controller={"kind": "unknown"}, controller_known=False)
     record = load_record(bundle_of(columns, case))
@@ -151,7 +151,7 @@ def test_a_reference_that_nobody_knows(bundle_of, columns_of):
         load_record(bundle_of(columns, case_of("axis"), "known"))
 
 
-def test_open_loop_has_its_command_as_input(bundle_of, columns_of):
+def test_open_loop_case_uses_the_recorded_command(bundle_of, columns_of):
     record = load_record(bundle_of(columns_of("axis", 3000, 1000.0), case_of("axis", controller={"kind": "none"})))
     assert recompute_law(record) is None
     assert not record.closed_loop
@@ -193,7 +193,7 @@ def rename(old, new):
         ("axis", lambda c: c.__setitem__("t", c["t"] * 1.02), "980.392 rows a second where sample_rate .* is 1000 Hz"),
     ],
 )
-def test_bad_columns_are_refused_with_what_would_be_right(bundle_of, columns_of, kind, edit, said):
+def test_invalid_columns_are_refused_with_a_correction(bundle_of, columns_of, kind, edit, said):
     columns = columns_of(kind, 3000, RATES[kind])
     edit(columns)
     with pytest.raises(UserError, match=said) as error:
@@ -214,14 +214,14 @@ def test_bad_columns_are_refused_with_what_would_be_right(bundle_of, columns_of,
         ("axis", lambda c: c.update({k: v[:1] for k, v in c.items()}), "holds 1 rows"),
     ],
 )
-def test_a_record_that_supports_no_verdict(bundle_of, columns_of, kind, edit, said):
+def test_record_without_motion_or_length_has_no_answer(bundle_of, columns_of, kind, edit, said):
     columns = columns_of(kind, 3000, RATES[kind])
     edit(columns)
     with pytest.raises(NoAnswer, match=said):
         load_record(bundle_of(columns, case_of(kind)))
 
 
-def test_sensors_that_the_case_forgot(bundle_of, columns_of):
+def test_missing_sensor_resolutions_are_refused(bundle_of, columns_of):
     columns = columns_of("ldu", 3000, 1000.0)
     with pytest.raises(UserError, match=r"case\.json: sensors\.scale_m_per_count is missing"):
         load_record(bundle_of(columns, case_of("ldu", sensors__scale_m_per_count=None)))
@@ -229,13 +229,13 @@ def test_sensors_that_the_case_forgot(bundle_of, columns_of):
         load_record(bundle_of(columns, case_of("ldu", sensors__encoder_counts_per_rev=None), "b"))
 
 
-def test_one_drive_or_one_reel_may_rest(bundle_of, columns_of):
+def test_one_drive_or_one_reel_may_be_at_rest(bundle_of, columns_of):
     columns = {**columns_of("ivu", 3000), "u2": np.full(3000, 0.4), "reel1_counts": np.zeros(3000)}
     record = load_record(bundle_of(columns, case_of("ivu")))
     assert any("reel1_counts" in text for text in record.case.warnings)
 
 
-def test_y_holds_the_counters_unwrapped(bundle_of, columns_of):
+def test_record_unwraps_the_counters(bundle_of, columns_of):
     columns = columns_of("ldu", 3000, 1000.0)
     true = columns["encoder_counts"]
     columns["encoder_counts"] = true % 65536
@@ -244,7 +244,7 @@ def test_y_holds_the_counters_unwrapped(bundle_of, columns_of):
     assert np.array_equal(record.columns["encoder_counts"], true % 65536)
 
 
-def test_an_angle_that_starts_anew_each_turn(bundle_of, columns_of):
+def test_angle_with_a_jump_per_turn_is_unwrapped(bundle_of, columns_of):
     columns = columns_of("axis", 3000, 1000.0)
     true = np.linspace(0.1, 30.0, 3000)
     columns["x"] = true % (2 * np.pi)
@@ -253,25 +253,25 @@ def test_an_angle_that_starts_anew_each_turn(bundle_of, columns_of):
 
 
 @pytest.mark.parametrize("name", [f"case-{k:04d}" for k in range(1, 25)])
-def test_practice_cases_give_their_commands_bit_for_bit(shared, name):
+def test_law_of_practice_cases_reproduces_the_commands_bit_for_bit(shared, name):
     record = load_record(shared(f"blind/practice/{name}"))
     assert np.array_equal(recompute_law(record), record.u)
     assert record.closed_loop
     assert record.case.warnings == ()
 
 
-def test_the_ball_screw_gives_its_command_nearly(shared):
+def test_law_of_the_ball_screw_reproduces_the_command_approximately(shared):
     record = load_record(shared("data/emps"))
     agreement = law_agreement(record)
     assert record.closed_loop
     assert not agreement.exact
-    assert agreement.worst_row == 0  # the speed before the first row is not in the record
+    assert agreement.worst_row == 0  # the record has no speed before the first row
     assert agreement.median < 1e-4
     assert record.case.warnings == ()
 
 
 @pytest.mark.parametrize("name", ["silverbox_multisine", "bldc_slow_0", "bldc_slow_1", "bldc_slow_2"])
-def test_machines_without_a_known_law(shared, name):
+def test_real_machines_without_a_law_are_in_open_loop(shared, name):
     folder = shared(f"data/{name}")
     table = pq.read_table(folder / "recording.parquet")
     columns = {key: table.column(key).to_numpy() for key in table.column_names}
@@ -282,7 +282,7 @@ def test_machines_without_a_known_law(shared, name):
     assert np.isnan(record.ref).all() == name.startswith("bldc")
 
 
-def test_a_copy_with_another_rate_is_refused(shared, tmp_path):
+def test_case_with_another_sample_rate_is_refused(shared, tmp_path):
     folder = shutil.copytree(shared("blind/practice/case-0001"), tmp_path / "copy")
     text = (folder / "case.json").read_text()
     (folder / "case.json").write_text(text.replace('"sample_rate": 500.0', '"sample_rate": 400.0'))
@@ -290,7 +290,7 @@ def test_a_copy_with_another_rate_is_refused(shared, tmp_path):
         load_record(folder)
 
 
-def test_rows_at_uneven_times_are_laid_onto_an_even_clock(bundle_of, columns_of):
+def test_rows_at_uneven_times_are_resampled_to_an_even_clock(bundle_of, columns_of):
     t = np.cumsum(np.random.default_rng(2).uniform(0.8e-3, 1.2e-3, 4000))
     columns = {**columns_of("axis", 4000, 1000.0), "t": t, "x": np.sin(3 * t), "u": np.cos(2 * t)}
     columns["ref"] = np.full(4000, np.nan)
@@ -306,7 +306,7 @@ def test_rows_at_uneven_times_are_laid_onto_an_even_clock(bundle_of, columns_of)
     assert (record.columns["t"] == t).all()
 
 
-def test_counters_stay_whole_on_an_even_clock(bundle_of, columns_of):
+def test_resampled_counters_stay_integers(bundle_of, columns_of):
     t = np.cumsum(np.random.default_rng(2).uniform(0.8e-3, 1.2e-3, 4000))
     case = case_of("ldu", sample_rate=None, controller={"kind": "unknown"}, controller_known=False)
     record = load_record(bundle_of({**columns_of("ldu", 4000, 1000.0), "t": t}, case))

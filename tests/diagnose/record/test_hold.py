@@ -4,7 +4,7 @@ import pytest
 from rtctl.diagnose.record.hold import half_a_tick_on
 
 
-def test_a_slow_tone_is_half_a_tick_earlier():
+def test_half_a_tick_advance_of_a_slow_tone():
     k = np.arange(1000)
     told = half_a_tick_on(np.sin(2 * np.pi * 0.01 * k)[:, None])[:, 0]
     gain = np.sinc(0.01) ** 2 / np.cos(np.pi * 0.01)

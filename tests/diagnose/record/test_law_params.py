@@ -1,4 +1,4 @@
-"""Params of the law of our own machines: what it writes for recorded columns, to the bit."""
+"""Law params of recordings of the program: bit-exact output for recorded columns."""
 
 from pathlib import Path
 
@@ -20,13 +20,13 @@ def axis(config, tmp_path_factory) -> Path:
     return folder
 
 
-def test_the_shipped_axis_is_recomputed_to_the_bit(axis):
+def test_law_of_the_shipped_axis_is_recomputed_bit_for_bit(axis):
     record = load_record(axis)
     assert record.closed_loop and law_agreement(record).worst == 0.0
     assert np.ptp(record.u) > 0.5
 
 
-def test_friction_and_computed_torque_of_the_linear_drive_are_recomputed_from_the_shaped_reference(config, tmp_path):
+def test_feedforward_of_the_linear_drive_is_recomputed_from_the_shaped_reference(config, tmp_path):
     slow = {"reference": {"steps": [{"at": 0.2, "to": 0.01, "ramp": 0.05}, {"at": 1.2, "to": 0.0, "ramp": 0.05}]}}
     api.record(config("ldu", mode="fused", set={**slow, "law.inertia.volts": 0.08}), 2.1, tmp_path / "run")
     record = load_record(tmp_path / "run")
@@ -39,7 +39,7 @@ def test_friction_and_computed_torque_of_the_linear_drive_are_recomputed_from_th
     assert np.abs(without - record.u).max() > 0.01
 
 
-def test_the_law_begins_as_it_stood_when_the_machine_was_armed(axis):
+def test_law_state_begins_with_the_armed_rows(axis):
     record = load_record(axis)
     p = law_params(record)
     assert len(record.armed["t"]) > 0
@@ -48,7 +48,7 @@ def test_the_law_begins_as_it_stood_when_the_machine_was_armed(axis):
     assert cold["started"][0] == 0
 
 
-def test_a_simulation_begins_at_the_first_count_of_the_record(axis):
+def test_law_origin_is_the_first_count_of_the_record(axis):
     record = load_record(axis)
     record = record._replace(y={"x": record.y["x"] + 7 * record.case.sensors.x_resolution_m})
     p = law_params(record)

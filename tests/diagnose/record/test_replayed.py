@@ -1,4 +1,4 @@
-"""The law of our own recordings: recomputed, and replayed where it does not give the command."""
+"""Law of recordings of the program: recomputed, and replayed after a disagreement."""
 
 import json
 import shutil
@@ -20,7 +20,7 @@ ROWS = 1500
 
 @pytest.fixture(scope="module")
 def ran(config, tmp_path_factory) -> Path:
-    """Three seconds of the reel unit with its whole law: friction and inertia feedforward, and a tension ramp."""
+    """Recording of 3 s of the reel unit with its full law: friction and inertia feedforward, tension ramp."""
     folder = tmp_path_factory.mktemp("own") / "run"
     moves = {"reference": {"steps": [{"at": 0.2, "to": 1.5, "ramp": 3.0}, {"at": 1.6, "to": 0.0, "ramp": 3.0}]}}
     api.record(config("ivu", mode="fused", set=moves), 3.0, folder)
@@ -29,17 +29,17 @@ def ran(config, tmp_path_factory) -> Path:
 
 @pytest.fixture
 def copy(ran, tmp_path) -> Iterator[Path]:
-    """One to do wrong to, gone before the suite replays what it has recorded."""
+    """A copy to modify, removed before the suite replays its recordings."""
     yield Path(shutil.copytree(ran, tmp_path / "copy"))
     shutil.rmtree(tmp_path / "copy")
 
 
 def law_words(folder: Path) -> str:
-    """What is said of the law beside the verdict."""
+    """Warning about the law."""
     return next(w for w in load_record(folder).case.warnings if "the law" in w)
 
 
-def test_a_command_that_the_law_did_not_write_is_told_with_its_tick(copy):
+def test_command_that_differs_from_the_law_is_reported_with_its_tick(copy):
     path = copy / "recording.parquet"
     table = pq.read_table(path)
     values = table.column("u1").to_numpy().copy()
@@ -51,7 +51,7 @@ def test_a_command_that_the_law_did_not_write_is_told_with_its_tick(copy):
     assert "nothing is wrong" not in said
 
 
-def test_code_in_the_recording_is_not_run(copy, tmp_path):
+def test_code_in_a_recording_is_not_executed(copy, tmp_path):
     case = json.loads((copy / "case.json").read_text())
     case["config"]["law"]["position"] = {"kind": "./my_law.py:MyLaw"}
     case["config"]["own"] = {"./my_law.py": f"open({str(tmp_path / 'ran')!r}, 'w').close()\n"}
@@ -60,7 +60,7 @@ def test_code_in_the_recording_is_not_run(copy, tmp_path):
 
 
 @pytest.mark.parametrize("column", ["tick", "order"])
-def test_a_recording_that_is_not_ours_is_not_replayed(copy, column):
+def test_foreign_recording_is_not_replayed(copy, column):
     bundle = load_bundle(copy)
     del bundle.columns[column]
     assert replayed_law(bundle) is None

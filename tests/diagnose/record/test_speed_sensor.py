@@ -1,4 +1,4 @@
-"""Noise of a sensor of speed, and one that does not know direction."""
+"""Noise of a speed sensor, and speed sensors without direction."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ RINGS = TERMS["structure.resonance"].settings(node="carriage", f_Hz=1.7, mass=0.
 
 
 def recorded(*terms, blind=False):
-    """Speed (n,) and commands (n, 1) of an axis with these terms, in noise; `blind`: without its sign."""
+    """Record of the noisy speed of an axis with the given terms; `blind`: absolute speed."""
     u = np.repeat(np.random.default_rng(0).choice([-1.0, 1.0], ROWS // 5), 5)[:, None]
     case = read_case(CASE, ".")
     record = at_rest(case, ROWS, u=u, sensors=("speed",))
@@ -29,20 +29,20 @@ def recorded(*terms, blind=False):
 
 
 @pytest.mark.parametrize(("terms", "blind"), [((), False), ((RINGS,), False), ((RINGS,), True)])
-def test_noise_is_what_no_regression_foretells(terms, blind):
-    """Within a factor of two and a half of a machine that is not even linear."""
+def test_noise_level_is_the_residual_of_a_regression(terms, blind):
+    """The estimate is within a factor of 2.5, also for a nonlinear machine."""
     record = recorded(*terms, blind=blind)
     found = noise(record.y["speed"], record.u)
     assert 0.8 * NOISE < found < 2.5 * NOISE
     assert resolution(record) == found
 
 
-def test_few_rows_tell_no_noise():
+def test_few_or_constant_rows_give_no_noise_level():
     assert noise(np.ones(20), np.ones((20, 1))) == 0.0
     assert noise(np.zeros(200), np.zeros((200, 1))) == 0.0
 
 
-def test_a_folded_speed_gets_its_sign_from_the_command():
+def test_rectified_speed_gets_its_sign_from_the_command():
     true, record = recorded().y["speed"], recorded(blind=True)
     shown, u = record.y["speed"], record.u[:, 0]
     assert folded(shown, u) and not folded(true, u) and not folded(shown, np.abs(u))

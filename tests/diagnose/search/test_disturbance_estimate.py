@@ -1,4 +1,4 @@
-"""What a record suggests by itself, on signals in which it is known."""
+"""Orders, positions and jumps in signals with known content."""
 
 import numpy as np
 import pytest
@@ -9,14 +9,14 @@ from rtctl.diagnose.search.disturbance_estimate import MOST, ORDERS, Along, jump
 
 
 def turning(n=6000, turns=3.0, seed=0):
-    """An angle (n,) rad that goes to and fro, at uneven speed."""
+    """Angle (n,) in rad of a reciprocating motion at variable speed."""
     t = np.linspace(0, 1, n)
     return turns * 2 * np.pi * (0.5 - 0.5 * np.cos(2 * np.pi * 2 * t)) + 0.3 * np.sin(2 * np.pi * 5 * t)
 
 
 @settings(deadline=None, max_examples=20)
 @given(st.sampled_from([1.0, 2.0, 5.0, 7.0, 13.0, 28.0]), st.floats(-3.1, 3.1), st.integers(0, 1000))
-def test_an_order_is_found_in_drift_friction_and_noise(order, phase, seed):
+def test_ripple_order_is_found_under_drift_friction_and_noise(order, phase, seed):
     angle = turning()
     rng = np.random.default_rng(seed)
     signal = np.cos(order * angle + phase) + 0.7 * rng.standard_normal(len(angle))
@@ -25,40 +25,40 @@ def test_an_order_is_found_in_drift_friction_and_noise(order, phase, seed):
     assert found[0] == order
 
 
-def test_less_than_a_turn_does_not_tell_neighbouring_orders_apart():
+def test_less_than_a_turn_does_not_separate_adjacent_orders():
     angle = turning(turns=0.4)
     found = orders_of(float(np.ptp(angle)), spectrum(Along(angle), np.cos(6 * angle), ORDERS), MOST)
     assert 6.0 in found
     assert {found[0] - 1.0, found[0] + 1.0} <= set(found)
 
 
-def test_a_share_of_the_variance_is_between_none_and_all():
+def test_spectrum_is_a_share_of_the_variance():
     angle = turning()
     share = spectrum(Along(angle), np.cos(3 * angle), np.array([3.0, 7.0]))
     assert share[0] == pytest.approx(1.0, abs=1e-6)
     assert 0.0 <= share[1] < 0.2
 
 
-def test_of_less_than_half_a_period_nothing_is_said():
+def test_orders_with_less_than_half_a_period_have_no_share():
     angle = np.linspace(0, 1.0, 500)
     share = spectrum(Along(angle), np.cos(angle), np.array([0.5, 2.0, 4.0]))
     assert (share[:2] == 0.0).all()
     assert share[2] > 0.0
 
 
-def test_a_signal_of_nothing_has_no_peaks():
+def test_zero_signal_has_no_peaks():
     angle = turning()
     assert peaks(ORDERS, spectrum(Along(angle), np.zeros(len(angle)), ORDERS), MOST) == []
 
 
-def test_peaks_come_highest_first():
+def test_peaks_are_sorted_by_height():
     height = np.array([0, 1, 0, 3, 0, 2, 0, 0.5, 0, 0])
     assert peaks(np.arange(10.0), height, 3) == [3.0, 5.0, 1.0]
 
 
 @settings(deadline=None, max_examples=20)
 @given(st.floats(0.1, 0.9), st.sampled_from([-1.0, 1.0]))
-def test_a_spot_is_found_beside_a_slope(where, sign):
+def test_bump_position_is_found_beside_a_slope(where, sign):
     way = 0.05 * (1 - np.cos(np.linspace(0, 12 * np.pi, 8000)))
     at = 0.1 * where
     signal = sign * np.exp(-0.5 * ((way - at) / 1.5e-3) ** 2) + 5.0 * way
@@ -67,18 +67,18 @@ def test_a_spot_is_found_beside_a_slope(where, sign):
     assert len(spots(way, signal, 3)) == 3
 
 
-def test_counts_that_were_lost_for_good_are_found_largest_first():
+def test_permanent_jumps_are_found_in_order_of_size():
     rng = np.random.default_rng(0)
     error = 0.3 * rng.standard_normal(4000)
     error[1500:] += 20.0
     error[3000:] -= 60.0
-    error[2200] += 40.0  # comes back at once
+    error[2200] += 40.0  # single outlier
     found = jumps(error, 1.0)
     assert [k for k, _ in found] == [3000, 1500]
     assert [size for _, size in found] == pytest.approx([-60.0, 20.0], abs=1.0)
 
 
-def test_jumps_that_noise_nearly_hides_count_where_one_is_sure_and_are_of_one_size():
+def test_repeated_weak_jumps_are_found_with_a_common_size():
     rng = np.random.default_rng(2)
     error = 0.7 * rng.standard_normal(8000)
     for k in range(500, 8000, 500):
@@ -89,25 +89,25 @@ def test_jumps_that_noise_nearly_hides_count_where_one_is_sure_and_are_of_one_si
     assert max(sizes) - min(sizes) < 1e-9 and sizes[0] == pytest.approx(7.0, abs=0.3)
     weak = 0.7 * rng.standard_normal(8000)
     weak[4000:] += 4.5
-    assert jumps(weak, 1.0) == []  # alone it may be chance
+    assert jumps(weak, 1.0) == []  # a single weak jump may be noise
 
 
-def test_a_reversal_that_the_model_misses_is_no_jump():
-    """An error that rings up within ticks stands out of the record, but not out of the ticks around it."""
+def test_transient_oscillation_is_not_a_jump():
+    """A ringing error exceeds the record, but not the adjacent ticks."""
     error = 0.2 * np.random.default_rng(0).standard_normal(4000)
     error[2000:2060] += 30.0 * np.sin(np.arange(60) * 0.5)
     assert jumps(error, 1.0) == []
 
 
-def test_two_jumps_within_a_few_ticks_are_two():
+def test_two_close_jumps_are_separate():
     error = np.random.default_rng(3).normal(0.0, 0.3, 1000)
     error[500:] += 33.0
     error[502:] += 33.0
     assert sorted(k for k, _ in jumps(error, 1.0)) == [500, 502]
-    error[504:] += 33.0  # three are a motion
+    error[504:] += 33.0  # three close jumps are a motion
     assert jumps(error, 1.0) == []
 
 
-def test_in_noise_nothing_jumps():
+def test_noise_has_no_jumps():
     error = 0.5 * np.random.default_rng(1).standard_normal(4000)
     assert jumps(error, 1.0) == []

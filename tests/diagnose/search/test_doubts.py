@@ -12,12 +12,12 @@ from rtctl.diagnose.model.recording import record_of
 from rtctl.diagnose.search.doubts import doubted, no_effect
 from rtctl.diagnose.search.search import Found
 
-WEAK = 0.3  # of the gain of the description
+WEAK = 0.3  # share of the nominal gain
 GAIN = "drives.amplifier.gain"
 
 
 def found_of(machine, terms=()):
-    """The fitted description of the belt axis, beside a recording of `machine`."""
+    """Base fit of the nominal belt axis to a recording of `machine`."""
     columns = columns_of(case_of(machine), command(0.6), terms)
     like, space = together([record_of(columns, read_case(case_of(BELT), "bundle"), Path("bundle/recording.parquet"))])
     base = refit(like, space)
@@ -25,12 +25,12 @@ def found_of(machine, terms=()):
 
 
 def weak():
-    """The belt axis with an amplifier that gives a third of what it should."""
+    """Belt axis with 30 % of the nominal amplifier gain."""
     amplifier = dict(BELT["drives"]["amplifier"])
     return {**BELT, "drives": {"amplifier": {**amplifier, "gain": WEAK * float(amplifier["gain"])}}}
 
 
-def test_a_gain_that_is_wrong_by_far_is_found():
+def test_gain_far_from_its_nominal_value_is_found():
     found = found_of(weak())
     doubts = doubted(found)
     gain = next(f for f in doubts if f.space.doubted == GAIN)
@@ -40,11 +40,11 @@ def test_a_gain_that_is_wrong_by_far_is_found():
     assert first.unlisted
 
 
-def test_a_right_description_is_not_doubted():
+def test_correct_description_has_no_doubted_parameter():
     assert doubted(found_of(BELT)) == ()
 
 
-def test_what_has_a_name_of_its_own_is_no_wrong_number():
+def test_parameter_with_a_corresponding_effect_is_not_doubted():
     assert not any(f.space.doubted.endswith(".dry") for f in doubted(found_of(BELT, [RUB])))
     assert not no_effect("physics.0.k")
     assert no_effect("joints.belt.stiffness")

@@ -4,17 +4,17 @@ from rtctl.diagnose.search.extend import Promise, extended, in_turns, key, scree
 
 
 def promise(gain, power):
-    """A promise of which only the numbers are asked."""
+    """Promise with gain and power only."""
     return Promise(None, None, None, gain, power)
 
 
-def test_what_least_squares_sees_has_every_second_turn():
+def test_candidates_alternate_between_gain_and_power():
     one, two, three = promise(9.0, 1.0), promise(5.0, 2.0), promise(1.0, 8.0)
     assert in_turns([two, three, one])[:2] == [one, three]
     assert len(in_turns([one, two, three])) == 3
 
 
-def test_the_effect_that_promises_most_is_fitted_beside_any_model():
+def test_most_promising_effect_is_fitted_beside_a_model():
     found = named().found
     merit = found.merit
     known = {}
@@ -23,12 +23,12 @@ def test_the_effect_that_promises_most_is_fitted_beside_any_model():
     assert max(fits, key=merit).names == ("friction.coulomb:carriage",)
 
 
-def test_a_model_is_not_extended_by_what_it_has():
+def test_model_is_not_extended_by_its_own_effects():
     best = named().found.best
     assert not set(best.names) & {score.hypothesis.name for score in screened(best).scores}
 
 
-def test_a_look_alike_is_fitted_whatever_it_promises():
+def test_look_alike_is_always_fitted():
     found = named().found
     plain = {h.term for f in extended(found.like, [found.base], {}, 1, found.merit) for h in f.space.hypotheses}
     alike = extended(found.like, [found.base], {}, 1, found.merit, None, ("drive.deadband",))
@@ -36,7 +36,7 @@ def test_a_look_alike_is_fitted_whatever_it_promises():
     assert "drive.deadband" not in plain
 
 
-def test_where_nothing_stood_terms_that_promise_to_stand_are_asked_for():
+def test_second_pass_tries_only_new_terms():
     found = named().found
     tried = extended(found.like, [found.base], {}, 1, found.merit)
     more = extended(found.like, [found.base], {}, 1, found.merit, passed=[f.names for f in tried])

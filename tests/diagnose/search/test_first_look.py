@@ -1,4 +1,4 @@
-"""The sentence that is told before any name is looked for."""
+"""Message before the search of an effect."""
 
 from graph_cases import BELT, RUB, case_of, command, record
 
@@ -12,13 +12,13 @@ def look(terms):
     return first_look(refit(*together([record(case_of(BELT), command(0.6), terms)])))
 
 
-def test_what_is_missing_shows_before_it_has_a_name():
+def test_first_look_reports_a_missing_effect():
     assert "something is missing: encoder is" in look([RUB])
 
 
-def test_a_description_that_is_right_leaves_noise():
+def test_first_look_reports_a_residual_at_the_noise_level():
     assert "down to its noise" in look([])
 
 
-def test_the_console_knows_how_it_begins():
+def test_console_prefix_matches_the_first_look():
     assert FIRST == WORD

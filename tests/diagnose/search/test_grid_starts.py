@@ -1,4 +1,4 @@
-"""The list of what a record can be asked about: complete, within the terms' own bounds, and of a size that shows."""
+"""Search coordinates of the terms: complete, and existing settings."""
 
 import pytest
 
@@ -22,7 +22,7 @@ def names(parts):
 
 
 @pytest.mark.parametrize("term", SEARCH)
-def test_the_search_walks_along_settings_that_the_term_has(term):
+def test_search_coordinates_are_settings_of_the_term(term):
     fields = TERMS[term].settings.model_fields
     for name in names((*SEARCH[term], *TERMS[term].richer, *TERMS[term].sliding)):
         assert name in fields, f"{term} has no {name}"

@@ -12,26 +12,26 @@ from rtctl.plants.physics import TERMS
 
 
 @cache
-def of(name):
+def hypotheses_of(name):
     machine, u = {"belt": (BELT, 0.6), "pendulum": (PENDULUM, 4.0)}[name]
     sim = Simulator(record(case_of(machine), command(u)))
     return sim, {h.name for h in hypotheses(sim, nominal(sim.case))}
 
 
-def test_nodes_are_the_names_of_the_description():
-    sim, names = of("belt")
+def test_hypothesis_nodes_are_names_of_the_description():
+    sim, names = hypotheses_of("belt")
     machine = sim.case.machine
     there = {*machine.bodies, *machine.joints, *machine.drives, *machine.sensors, "loop"}
     assert {name.partition(":")[2] for name in names} <= there
     assert {"friction.coulomb:motor", "friction.coulomb:carriage", "transmission.backlash:belt"} <= names
 
 
-def test_a_machine_without_a_joint_has_lost_motion_before_its_only_sensor_alone():
-    names = of("pendulum")[1]
+def test_machine_without_joints_has_backlash_only_at_its_sensor():
+    names = hypotheses_of("pendulum")[1]
     assert {name for name in names if name.startswith("transmission.")} == {"transmission.backlash:encoder"}
 
 
-def test_one_law_has_one_name_gravity_in_less_than_a_turn_and_imbalance_in_whole_ones():
+def test_weight_is_gravity_below_one_turn_and_imbalance_above():
     def weights(u):
         sim = Simulator(record(case_of(PENDULUM), command(u)))
         turns = np.ptp(sim.seen) / (2 * np.pi)
@@ -44,16 +44,16 @@ def test_one_law_has_one_name_gravity_in_less_than_a_turn_and_imbalance_in_whole
     assert turns < 1.0 and names == {"load.gravity:rod"}
 
 
-def test_what_compares_sensors_needs_two():
-    assert "sensor.scale:scale" in of("belt")[1]
-    assert not any(TERMS[n.partition(":")[0]].needs.compared for n in of("pendulum")[1])
+def test_comparative_sensor_terms_need_two_sensors():
+    assert "sensor.scale:scale" in hypotheses_of("belt")[1]
+    assert not any(TERMS[n.partition(":")[0]].needs.compared for n in hypotheses_of("pendulum")[1])
 
 
-def test_terms_are_those_of_the_kernel():
-    assert {name.partition(":")[0] for name in of("belt")[1]} <= set(kernel().names)
+def test_hypothesis_terms_are_terms_of_the_kernel():
+    assert {name.partition(":")[0] for name in hypotheses_of("belt")[1]} <= set(kernel().names)
 
 
-def test_friction_along_the_way_asks_for_dry_friction_that_it_alters():
+def test_position_dependent_friction_needs_dry_friction():
     def positions(dry):
         parts = {**PENDULUM, "bodies": {"rod": {**PENDULUM["bodies"]["rod"], "dry": dry}}}
         sim = Simulator(record(case_of(parts), command(4.0)))
@@ -83,7 +83,7 @@ def of_screw():
     return sim, hypotheses(sim, model, hints(sim, model, 100) | waves)
 
 
-def test_terms_stand_where_the_table_of_nodes_says():
+def test_hypotheses_of_a_ball_screw_have_the_documented_nodes():
     names = {h.name for h in of_screw()[1]}
     assert {f"ripple.cogging:{body}" for body in ("motor", "screw", "table")} <= names
     assert {f"friction.load:{body}" for body in ("motor", "screw")} <= names
@@ -92,19 +92,21 @@ def test_terms_stand_where_the_table_of_nodes_says():
     assert {"ripple.encoder:encoder", "ripple.encoder:scale", "drive.thermal:two"} <= names
 
 
-def test_each_of_several_drives_may_have_a_supply_of_its_own():
+def test_several_drives_have_common_and_separate_supply_hypotheses():
     feeds = {(h.node, h.fixed.get("feeds", "all")) for h in of_screw()[1] if h.term == "drive.supply_sag"}
     assert feeds == {("one", "all"), ("one", "own"), ("two", "own")}
-    assert not any("feeds" in h.fixed for h in hypotheses(of("belt")[0], nominal(of("belt")[0].case)))
+    assert not any(
+        "feeds" in h.fixed for h in hypotheses(hypotheses_of("belt")[0], nominal(hypotheses_of("belt")[0].case))
+    )
 
 
-def test_a_joint_slips_at_what_it_carries():
+def test_slip_limits_of_a_joint_follow_its_load():
     all_of_them = of_screw()[1]
     limits = sorted(h.coordinates[0].scale for h in all_of_them if h.name == "transmission.slip:coupling")
-    assert len(limits) == 3 and 0.0 < limits[0] < limits[2] < 1.0  # Nm, of a motor of up to half a newton metre
+    assert len(limits) == 3 and 0.0 < limits[0] < limits[2] < 1.0  # Nm; the motor gives at most 0.5 Nm
 
 
-def test_an_error_of_another_sensor_shows_its_own_order():
+def test_ripple_order_of_a_second_sensor_is_hinted():
     ripple = {"term": "ripple.encoder", "node": "second", "A": 0.02, "order": 5}
     second = {"body": "rod", "measures": "position", "column": "second", "counts_per_unit": 5000.0}
     pendulum = {**PENDULUM, "sensors": {**PENDULUM["sensors"], "second": second}}
@@ -113,10 +115,10 @@ def test_an_error_of_another_sensor_shows_its_own_order():
     assert np.isclose(found[0], 5.0, atol=0.3)
 
 
-def test_an_asymmetry_needs_both_directions():
+def test_friction_asymmetry_needs_motion_in_both_directions():
     made = record(case_of(BELT), command(0.6))
     one_way = Simulator(made._replace(y={name: np.maximum.accumulate(y) for name, y in made.y.items()}))
     names = {h.name for h in hypotheses(one_way, nominal(one_way.case))}
     assert "friction.asymmetry:carriage" not in names
     assert "friction.coulomb:carriage" in names
-    assert "friction.asymmetry:carriage" in of("belt")[1]
+    assert "friction.asymmetry:carriage" in hypotheses_of("belt")[1]

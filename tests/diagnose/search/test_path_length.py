@@ -1,4 +1,4 @@
-"""The path of the old reel unit, which gets longer where the tape is pulled less, in a recording of one move."""
+"""Tension-dependent path length of the old reel unit, in a recording of one move."""
 
 import pytest
 
@@ -21,7 +21,7 @@ def base(tmp_path_factory):
     return refit(*together([load(folder)]))
 
 
-def test_no_other_law_takes_off_as_much(base):
+def test_path_length_has_the_largest_screening_gain(base):
     looked = screen(base, hypotheses(base.like.sim, base.model))
     first = max(looked.scores, key=lambda score: score.gain).hypothesis.name
     assert first == "tape.path_length:path"

@@ -15,23 +15,23 @@ SLIPS = "transmission.slip:belt"
 
 @cache
 def looked():
-    """The base of a belt that slips on its pulley, and what screening says beside it."""
+    """Base fit of a slipping belt, and its screening."""
     like, space = together([record(case_of(BELT), command(0.6), [SLIP])])
     base = refit(like, space)
     return base, screened(base)
 
 
-def test_a_difference_is_taken_in_the_steps_of_the_effect():
+def test_screening_difference_uses_the_step_size_of_the_effect():
     base, _ = looked()
     about = Linear(base)
     slip = next(s.hypothesis for s in looked()[1].scores if s.hypothesis.name == SLIPS)
     assert TERMS[slip.term].slips and about.coarse
-    far = base.space.add(slip).model(np.append(base.x, 1e-6))  # a limit that no force reaches
+    far = base.space.add(slip).model(np.append(base.x, 1e-6))  # limit above every force
     assert np.abs(base.like.raw(far, True) - about.start_of(slip)).max() == 0.0
     assert np.abs(base.like.raw(far, True) - about.start).max() > 0.0
 
 
-def test_every_start_of_a_limit_acts():
+def test_every_start_of_a_limit_changes_the_simulation():
     base, screen = looked()
     score = next(s for s in screen.scores if s.hypothesis.name == SLIPS)
     model = base.space.add(score.hypothesis).model
@@ -42,7 +42,7 @@ def test_every_start_of_a_limit_acts():
         assert np.abs(base.like.raw(model(np.append(base.x, x[-1]))) - none).max() > base.like.least.max()
 
 
-def test_slip_of_a_belt_is_the_best_single_effect():
+def test_belt_slip_is_the_best_single_effect():
     base, screen = looked()
     score = next(s for s in screen.scores if s.hypothesis.name == SLIPS)
     fits = [

@@ -1,4 +1,4 @@
-"""What stands beside what was found before."""
+"""Acceptance of a further effect."""
 
 from graph_cases import named
 
@@ -6,11 +6,11 @@ from rtctl.diagnose.search.standing import adds
 
 
 def with_another(fit, term):
-    """A model with a further effect that does nothing."""
+    """Model with a further effect of size zero."""
     return fit._replace(space=fit.space.add(fit.space.hypotheses[0]._replace(term=term)), x=fit.x.copy())
 
 
-def test_a_further_effect_brings_a_share_of_all_evidence():
+def test_further_effect_needs_a_share_of_the_total_evidence():
     found = named().found
     base, best = found.base, found.best
     more = with_another(best, "drive.offset")
@@ -20,10 +20,10 @@ def test_a_further_effect_brings_a_share_of_all_evidence():
 
     assert adds(base, base, best, merit(0.0))
     assert not adds(base, best, more, merit(5.0))
-    assert adds(base, best, more, merit(6.0))  # it leaves no more than noise, as the one effect does
+    assert adds(base, best, more, merit(6.0))  # both models have a residual at the noise level
 
 
-def test_evidence_does_not_count_for_a_small_effect_of_the_same_argument():
+def test_small_further_effect_of_the_same_argument_is_rejected():
     found = named().found
     base, best = found.base, found.best
     more = with_another(best, "friction.viscous")
@@ -31,7 +31,7 @@ def test_evidence_does_not_count_for_a_small_effect_of_the_same_argument():
     assert not adds(base, best, more, lambda f: merit[id(f)])
 
 
-def test_a_further_effect_may_be_large_instead():
+def test_large_further_effect_needs_less_evidence():
     found = named().found
     base, best = found.base, found.best
     fewer, more = best._replace(e=0.5 * base.e), best._replace(e=0.1 * base.e)
@@ -40,4 +40,4 @@ def test_a_further_effect_may_be_large_instead():
         return lambda f: {id(base): 0.0, id(fewer): 100.0, id(more): 100.0 + brought}[id(f)]
 
     assert adds(base, fewer, more, merit(4.0))
-    assert not adds(base, fewer, more, merit(2.0))  # by chance
+    assert not adds(base, fewer, more, merit(2.0))  # within chance

@@ -1,4 +1,4 @@
-"""Other forms of a hypothesis keep what they are forms of."""
+"""Richer forms of the terms."""
 
 from rtctl.plants.physics import TERMS
 
@@ -6,6 +6,6 @@ EXTRAS = {name for name, term in TERMS.items() if term.richer}
 HINTS = {"order": [7.0], "wavelength": [0.02]}
 
 
-def test_extras_belong_to_a_form_that_is_searched_for():
+def test_terms_with_richer_forms_are_searched():
     assert EXTRAS
     assert all(TERMS[name].search for name in EXTRAS)

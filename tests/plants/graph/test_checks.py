@@ -1,4 +1,4 @@
-"""A description that contradicts itself is refused with the path at fault and what would be right."""
+"""Refusal of contradictory descriptions: the message has the path and the correction."""
 
 import copy
 from typing import Any
@@ -23,7 +23,7 @@ TAPE: dict[str, Any] = {
     "joints": {"tape": {"from": "capstan", "to": "reel", "span": "open", "stiffness": 450.0}},
     "sensors": {"encoder": {"body": "capstan", "column": "counts"}},
 }
-REFUSED = {  # change -> what is said
+REFUSED = {  # path -> (value, message)
     "joints.belt.to": ("slid", "joints.belt.to: there is no body 'slid'; did you mean 'slide'?"),
     "joints.belt.from": ("slide", "joints.belt.to: the joint connects slide to itself"),
     "joints.belt.stiffness": (-1.0, "greater than or equal to 0"),
@@ -64,7 +64,7 @@ REFUSED_TAPE = {
 
 
 def changed(data: dict[str, Any], path: str, value: Any) -> dict[str, Any]:
-    """A description with another value, or without one where it is None."""
+    """Copy of a description with another value at `path`; None deletes the key."""
     out = copy.deepcopy(data)
     *groups, key = path.split(".")
     at = out
@@ -76,26 +76,26 @@ def changed(data: dict[str, Any], path: str, value: Any) -> dict[str, Any]:
     return out
 
 
-def test_the_two_machines_are_sound():
+def test_belt_and_tape_descriptions_are_valid():
     Description.model_validate(BELT)
     Description.model_validate(TAPE)
 
 
 @pytest.mark.parametrize("path", REFUSED)
-def test_what_is_refused_of_a_belt(path):
+def test_invalid_belt_description_is_refused(path):
     value, words = REFUSED[path]
     with pytest.raises(ValidationError, match=words):
         Description.model_validate(changed(BELT, path, value))
 
 
 @pytest.mark.parametrize("path", REFUSED_TAPE)
-def test_what_is_refused_of_a_tape(path):
+def test_invalid_tape_description_is_refused(path):
     value, words = REFUSED_TAPE[path]
     with pytest.raises(ValidationError, match=words):
         Description.model_validate(changed(TAPE, path, value))
 
 
-def test_rigid_joints_close_no_loop_and_do_not_end_at_the_frame():
+def test_rigid_loop_and_rigid_joint_to_the_frame_are_refused():
     loop = changed(BELT, "joints.belt", {"from": "motor", "to": "slide", "ratio": 0.01})
     loop["joints"]["second"] = {"from": "motor", "to": "slide", "ratio": 0.02}
     with pytest.raises(ValidationError, match=r"joints.second.stiffness is missing: .* closes a loop of rigid joints"):
@@ -104,7 +104,7 @@ def test_rigid_joints_close_no_loop_and_do_not_end_at_the_frame():
         Description.model_validate(changed(BELT, "joints.stop", {"from": "frame", "to": "slide"}))
 
 
-def test_a_machine_has_an_end():
+def test_too_many_bodies_and_machines_without_a_moving_body_are_refused():
     more = {f"b{i}": {"mass": 1.0} for i in range(linear.MOST_BODIES + 1 - len(BELT["bodies"]))}
     many = changed(BELT, "bodies", {**BELT["bodies"], **more})
     with pytest.raises(ValidationError, match=f"bodies: 13 are described; {linear.MOST_BODIES} is the most"):
@@ -114,7 +114,7 @@ def test_a_machine_has_an_end():
         Description.model_validate(still)
 
 
-def test_a_sensor_or_drive_of_a_rigid_joint_has_nothing_to_act_on():
+def test_force_sensor_at_a_rigid_joint_is_refused():
     rigid = changed(BELT, "joints.belt", {"from": "motor", "to": "slide", "ratio": 0.01})
     rigid["sensors"]["force"] = {"joint": "belt", "measures": "force", "column": "pull"}
     with pytest.raises(ValidationError, match=r"sensors.force.joint: belt is rigid"):

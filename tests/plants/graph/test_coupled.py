@@ -1,4 +1,4 @@
-"""Coupled mechanics: equations against Lagrange's, motion against another integrator, energy, friction that holds."""
+"""Coupled mechanics: Lagrange equations, motion against scipy's integrator, energy, static friction."""
 
 from typing import Any
 
@@ -17,25 +17,25 @@ G_N = 9.80665  # m/s^2
 
 
 def rod(m: float, J: float, d: float) -> list[tuple[float, float]]:
-    """Two masses and their ways from the joint that have the mass, the centre and the inertia of a slender rod."""
+    """Two point masses and their distances from the joint, with the mass, centre and inertia of a slender rod."""
     half = np.sqrt(J / m)
     return [(0.5 * m, d - half), (0.5 * m, d + half)]
 
 
 def furuta_mass(q: np.ndarray, way: float, r: float) -> np.ndarray:
-    """Place of a mass at `way` along the pendulum, by rotations of vectors."""
+    """Position (3,) of a mass at distance `way` along the pendulum, by rotation of vectors."""
     c, s = np.cos(q[0]), np.sin(q[0])
     turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     return turn @ (np.array([r, 0.0, 0.0]) + way * np.array([0.0, np.sin(q[1]), -np.cos(q[1])]))
 
 
 def cart_mass(q: np.ndarray, way: float, r: float) -> np.ndarray:
-    """Place of a mass at `way` along the pole."""
+    """Position (3,) of a mass at distance `way` along the pole."""
     return np.array([q[0] + way * np.sin(q[1]), 0.0, -way * np.cos(q[1])])
 
 
 def lagrange(place: Any, masses: list[tuple[float, float]], own: float, r: float) -> Any:
-    """M and h of point masses, by differences of their places: T = sum m |dx/dt|^2 / 2, V = sum m g z."""
+    """M and h of point masses by finite differences of positions: T = sum m |dx/dt|^2 / 2, V = sum m g z."""
 
     def energy(q: np.ndarray, v: np.ndarray) -> float:
         e = 1e-4
@@ -60,7 +60,7 @@ def lagrange(place: Any, masses: list[tuple[float, float]], own: float, r: float
 
 
 @pytest.mark.parametrize(("name", "place"), [("furuta", furuta_mass), ("cart-pole", cart_mass)])
-def test_equations_are_those_of_lagrange(name, place):
+def test_equations_of_motion_match_lagrange(name, place):
     data = data_of(name)
     first, second = data["bodies"].values()
     number = data["mechanics"]["parameters"]
@@ -74,7 +74,7 @@ def test_equations_are_those_of_lagrange(name, place):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_free_swing_is_that_of_another_integrator_and_keeps_its_energy(name):
+def test_free_swing_matches_scipy_and_conserves_energy(name):
     machine = free(name, 2.5)
     p, n = params(machine, 1e-3), 10_000
     q = played(p, np.zeros((n, 1)), 1) + np.array([0.0, 2.5])
@@ -92,13 +92,13 @@ def test_a_free_swing_is_that_of_another_integrator_and_keeps_its_energy(name):
     M = [of(x, x)[0] for x in q]
     weight = number["m"] * G_N * number["d"]
     E = np.array([0.5 * w @ m @ w for w, m in zip(v, M, strict=True)]) - weight * np.cos(q[:, 1])
-    top = (E[5:-5] + weight).max()  # above where it hangs
+    top = (E[5:-5] + weight).max()  # energy above the hanging position
     late, early = np.mean(E[-1000:-5]), np.mean(E[5:1000])
     assert abs(late - early) < 1e-4 * top
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_half_the_substep_changes_less_than_a_tenth_of_a_count(name):
+def test_halving_the_substep_changes_less_than_a_tenth_of_a_count(name):
     machine = Description.model_validate(data_of(name))
     t = np.arange(4000) * 1e-3
     u = (3.0 * np.sin(2 * np.pi * 0.9 * t) + 2.0 * np.sign(np.sin(2 * np.pi * 0.4 * t)))[:, None]
@@ -108,7 +108,7 @@ def test_half_the_substep_changes_less_than_a_tenth_of_a_count(name):
     assert np.abs(one - two).max() < 0.1
 
 
-def test_dry_friction_that_sticks_stands_exactly_still_while_the_other_body_swings():
+def test_sticking_body_stays_exactly_at_rest_while_the_other_body_swings():
     data = data_of("furuta")
     data["bodies"]["arm"]["dry"] = 0.05
     data["mechanics"]["at"] = {"pendulum": 1.0}
@@ -116,8 +116,8 @@ def test_dry_friction_that_sticks_stands_exactly_still_while_the_other_body_swin
     assert not q[:, 0].any() and np.ptp(q[:, 1]) > 1.0
 
 
-def test_a_stuck_arm_leaves_a_plain_pendulum():
-    """J q'' = -m g d sin q, where the arm holds."""
+def test_pendulum_at_a_sticking_arm_swings_like_a_simple_pendulum():
+    """J q'' = -m g d sin q, with the arm at rest."""
     data = data_of("furuta")
     data["bodies"] = {"arm": {"inertia": 1.2e-4, "dry": 0.05}, "pendulum": {"inertia": 3.33e-5}}
     data["mechanics"]["at"] = {"pendulum": 1.0}
@@ -131,8 +131,8 @@ def test_a_stuck_arm_leaves_a_plain_pendulum():
     np.testing.assert_allclose(q, true.y[0], atol=1e-4)
 
 
-def test_a_gear_before_the_arm_moves_its_share():
-    """A motor on a rigid gear of 5 is a rotor of 25 times its inertia on the arm."""
+def test_gear_reflects_the_rotor_inertia_onto_the_arm():
+    """A rotor behind a rigid gear of ratio 5 adds 25 times its inertia to the arm."""
     data = data_of("furuta")
     for body in data["bodies"].values():
         body |= {"dry": 0.0, "viscous": 0.0}
@@ -147,8 +147,8 @@ def test_a_gear_before_the_arm_moves_its_share():
     np.testing.assert_allclose(one, two, atol=1e-8)
 
 
-def test_the_linear_model_is_that_of_the_swing():
-    """w^2 = m g d / (J - (m r d)^2 / (J0 + m r^2)) about where the pendulum hangs; it falls where it stands."""
+def test_linear_model_has_the_eigenvalues_of_hanging_and_upright_pendulum():
+    """w^2 = m g d / (J - (m r d)^2 / (J0 + m r^2)); the hanging pendulum oscillates, the upright pendulum falls."""
     machine = free("furuta", 0.0)
     number, J0 = machine.mechanics.parameters, machine.bodies["arm"].inertia
     J = machine.bodies["pendulum"].inertia + number["m"] * number["d"] ** 2
@@ -160,13 +160,13 @@ def test_the_linear_model_is_that_of_the_swing():
     assert np.linalg.eigvals(A).real.max() == pytest.approx(w, rel=1e-6)
 
 
-def test_positions_that_the_motion_depends_on():
+def test_motion_of_the_furuta_pendulum_depends_on_the_pendulum_angle():
     machine = free("furuta", 0.0)
     assert felt(layout(machine), dict(machine.paths())) == ["pendulum"]
     assert pulled(layout(machine), dict(machine.paths())) == ["pendulum"]
 
 
-def test_a_matrix_that_is_not_positive_definite_is_refused():
+def test_mass_matrix_that_is_not_positive_definite_is_refused():
     machine = free("furuta", 0.0)
     values = {**dict(machine.paths()), "bodies.pendulum.inertia": -1.0}
     with pytest.raises(ValueError, match="M of Furuta is not positive definite"):

@@ -1,4 +1,4 @@
-"""Elements and places of the machines that come with the program, from their descriptions."""
+"""Elements and term locations of the shipped machines, from their descriptions."""
 
 from types import SimpleNamespace
 
@@ -12,47 +12,47 @@ from rtctl.plants.physics import TERMS, nodes
 PLANTS = {"ivu": ivu, "ldu": ldu}
 
 
-def at(plant, term, node):
+def location(plant, term, node):
     machine = plant.described()
     return spot(TERMS[term], SimpleNamespace(node=node), machine.layout, elements(machine.layout), machine.values)
 
 
 @pytest.mark.parametrize("name", PLANTS)
-def test_every_term_of_a_plant_can_stand_on_its_description(name):
+def test_description_of_a_plant_offers_every_node_of_its_terms(name):
     there = elements(PLANTS[name].described().layout)
     for term in TERMS.values():
         assert set(nodes(term, name)) <= set(nodes(term, there)), term.name
 
 
-def test_a_rotary_axis_has_what_turns_and_a_linear_one_what_slides():
+def test_linear_axis_lacks_only_the_terms_of_rotating_bodies():
     there = elements(axis.described().layout)
     for term in TERMS.values():
         missing = set(nodes(term, "axis")) - set(nodes(term, there))
-        assert not missing or term.name in ("load.imbalance", "ripple.encoder")  # those of what turns
+        assert not missing or term.name in ("load.imbalance", "ripple.encoder")  # terms of rotating bodies
 
 
-def test_tape_lies_around_the_capstan():
+def test_tape_terms_are_located_at_the_capstan_and_its_spans():
     assert contacts(ivu.described().layout.machine)["capstan"].spans == ("tape1", "tape2")
-    place = at(ivu, "transmission.slip", "capstan")
+    place = location(ivu, "transmission.slip", "capstan")
     assert (place.node, place.link, place.other) == (ivu.CAPSTAN, ivu.LINKS["tape1"], ivu.LINKS["tape2"])
-    place = at(ivu, "ripple.capstan", "capstan")
-    assert place.channel == NOWHERE  # nothing rolls on it whose sensor it moves
-    place = at(ivu, "geometry.radius_change", "reel2")
+    place = location(ivu, "ripple.capstan", "capstan")
+    assert place.channel == NOWHERE  # no sensor rolls on the capstan
+    place = location(ivu, "geometry.radius_change", "reel2")
     assert (place.link, place.other) == (ivu.LINKS["tape2"], ivu.LINKS["tape1"])
-    place = at(ivu, "friction.load", "motor1")
-    assert place.link == NOWHERE  # all springs at it press
-    place = at(ivu, "friction.load", "reel2")
+    place = location(ivu, "friction.load", "motor1")
+    assert place.link == NOWHERE  # all springs at the motor load it
+    place = location(ivu, "friction.load", "reel2")
     assert place.link == ivu.LINKS["tape2"]
 
 
-def test_the_strip_is_rigid_and_the_wheel_a_spring():
+def test_strip_contact_is_rigid_and_wheel_contact_is_compliant():
     machine = ldu.described().layout.machine
     assert {node: contact.joint for node, contact in contacts(machine).items()} == {
         "wheel": "motor",
         "capstan": "carriage",
     }
-    strip, wheel = at(ldu, "transmission.slip", "capstan"), at(ldu, "transmission.slip", "wheel")
+    strip, wheel = location(ldu, "transmission.slip", "capstan"), location(ldu, "transmission.slip", "wheel")
     assert (strip.link, strip.channel, strip.factor) == (NOWHERE, ldu.SENSORS["scale"], pytest.approx(3e-3))
     assert (wheel.link, wheel.channel) == (ldu.LINKS["wheel"], NOWHERE)
-    assert at(ldu, "guide.thickness", "carriage").channel == ldu.SENSORS["scale"]
-    assert at(ldu, "ripple.capstan", "capstan").channel == ldu.SENSORS["scale"]
+    assert location(ldu, "guide.thickness", "carriage").channel == ldu.SENSORS["scale"]
+    assert location(ldu, "ripple.capstan", "capstan").channel == ldu.SENSORS["scale"]

@@ -1,4 +1,4 @@
-"""Linear model of a described machine: weight is a spring, and sensors see what they are at."""
+"""Linear model of a described machine: gravity stiffness, sensor rows, term locations."""
 
 import numpy as np
 import pytest
@@ -32,21 +32,21 @@ def machine(**gravity):
 
 
 @pytest.mark.parametrize(("angle", "sign"), [(0.0, -1), (np.pi, 1), (np.pi / 2, 0)])
-def test_weight_is_a_spring_around_the_start(angle, sign):
+def test_gravity_is_a_linear_stiffness_at_the_start_angle(angle, sign):
     _, _, _, p = machine(angle=angle)
     A, B = linearised(p)
-    inertia = 1e-5 + 0.01 * 0.01  # of the motor's coordinate
+    inertia = 1e-5 + 0.01 * 0.01  # reflected to the motor
     assert A[1, 0] == pytest.approx(sign * 0.01 * 0.3 * 9.80665 * 0.2 / inertia, abs=1e-9)
     assert B[1, 0] == pytest.approx(0.01 / inertia)
 
 
-def test_a_sensor_sees_its_body_through_the_gear():
+def test_sensor_row_contains_the_gear_ratio():
     made, _, _, p = machine()
     assert sensor_row(made, p, "encoder").tolist() == [0.1, 0.0]
     assert sensor_row(made, p, "tacho").tolist() == [0.0, 0.1]
 
 
-def test_places_are_those_of_the_layout():
+def test_term_locations_follow_from_the_layout():
     made, lay, values, _ = machine()
     coulomb = TERMS["friction.coulomb"].settings.model_validate({"term": "friction.coulomb", "node": "rod", "F_C": 1.0})
     assert place_of(lay, values, coulomb) == (0, NOWHERE, NOWHERE, 0.1, NOWHERE)
@@ -61,10 +61,10 @@ def test_places_are_those_of_the_layout():
         check_node(made, "physics.0.node", "drive.deadband", "rod")
 
 
-def test_played_commands_swing_it_as_far_as_its_weight_allows():
+def test_constant_command_deflects_the_pendulum_to_its_equilibrium():
     _, _, _, p = machine()
     torque = 1.0 * 0.01 / 0.1  # at the rod, by 1 V
     y = played(p, np.full((6000, 1), 1.0), 5)
     settled = np.arcsin(torque / (0.3 * 9.80665 * 0.2))
     assert y[0].tolist() == [0.0, 0.0]
-    assert y[-3000:, 0].mean() == pytest.approx(settled, rel=0.15)  # it swings around there
+    assert y[-3000:, 0].mean() == pytest.approx(settled, rel=0.15)  # the pendulum oscillates about the equilibrium

@@ -40,8 +40,8 @@ def started(p: Any) -> Any:
     return s
 
 
-def test_modes_of_a_belt():
-    """w^2 = k (n^2 / J + 1 / m), damping d (n^2 / J + 1 / m) / 2 w; the rest moves freely."""
+def test_belt_mode_has_the_closed_form_frequency_and_damping():
+    """w^2 = k (n^2 / J + 1 / m), damping d (n^2 / J + 1 / m) / 2 w, and a rigid-body mode."""
     J, m, n, k, d = 2.1e-5, 1.4, 0.0127, 8e4, 35.0
     p = params(
         1e-4, bodies={"a": {"inertia": J}, "b": {"mass": m}},
@@ -56,7 +56,7 @@ def test_modes_of_a_belt():
 
 
 @pytest.mark.parametrize("h", [1e-4, 1e-3, 4e-3])
-def test_an_accelerometer_shows_the_instant_however_long_a_substep_is(h):
+def test_accelerometer_shows_the_instantaneous_acceleration_for_any_substep(h):
     m, k = 2.0, 800.0
     seen = {"eye": {"body": "a", "column": "eye", "measures": "acceleration"}}
     p = params(
@@ -70,7 +70,7 @@ def test_an_accelerometer_shows_the_instant_however_long_a_substep_is(h):
     assert s.m.y[0] == pytest.approx(-w * w * 0.01 * math.cos(w * 0.1), rel=1e-6)
 
 
-def test_an_accelerometer_shows_nothing_of_what_stands_still():
+def test_accelerometer_of_a_sticking_body_shows_zero():
     seen = {"eye": {"body": "a", "column": "eye", "measures": "acceleration"}}
     p = params(
         1e-3, sensors=seen, bodies={"a": {"mass": 2.0, "dry": "1 N"}},
@@ -83,8 +83,8 @@ def test_an_accelerometer_shows_nothing_of_what_stands_still():
 
 
 @pytest.mark.parametrize("extra", [{}, {"inductance": 1e-3}, {"bandwidth_hz": 300.0}])
-def test_a_voltage_drive_runs_to_the_speed_of_its_back_emf(extra):
-    """v = (K V / R - T) / (K^2 / R + F_v), whatever comes between."""
+def test_voltage_drive_reaches_the_speed_of_its_back_emf(extra):
+    """v = (K V / R - T) / (K^2 / R + F_v), independent of inductance and bandwidth."""
     K, R, dry, viscous = 0.05, 2.0, 0.01, 1e-4
     motor = {"body": "a", "kind": "voltage", "gain": 3.0, "torque_constant": K, "resistance": R, "limit": 2.0, **extra}
     sensors = {
@@ -103,7 +103,7 @@ def test_a_voltage_drive_runs_to_the_speed_of_its_back_emf(extra):
     assert drive_force(p, s.m, 0) == pytest.approx(dry + viscous * speed, rel=1e-6)
 
 
-def test_a_limit_holds_the_command_and_an_output_limit_what_the_drive_makes_of_it():
+def test_limit_bounds_the_command_and_output_limit_bounds_the_drive_output():
     p = params(
         1e-4,
         bodies={"a": {"inertia": 1e-5}},
@@ -129,7 +129,7 @@ def test_a_limit_holds_the_command_and_an_output_limit_what_the_drive_makes_of_i
         {"gain": 3.0, "kind": "voltage", "torque_constant": 0.05, "resistance": 2.0},
     ],
 )
-def test_gain_of_a_drive_is_its_force_at_rest(drive):
+def test_drive_gain_is_the_force_per_volt_at_rest(drive):
     machine = Description.model_validate(
         {"bodies": {"a": {"inertia": 1e-5}}, "drives": {"m": {"body": "a", **drive}}, "sensors": SEEN}
     )
@@ -139,7 +139,7 @@ def test_gain_of_a_drive_is_its_force_at_rest(drive):
     assert drive_gain(values, "m") * 2.0 == pytest.approx(drive_force(p, s.m, 0))
 
 
-def test_a_pendulum_swings_with_its_small_period():
+def test_pendulum_has_its_small_angle_period():
     m, r, J = 0.2, 0.3, 0.02
     p = params(1e-3, bodies={"a": {"inertia": J, "gravity": {"mass": m, "arm": r, "angle": 0.5}}})
     s = started(p)
@@ -150,8 +150,8 @@ def test_a_pendulum_swings_with_its_small_period():
     assert s.m.y[0] == pytest.approx(-0.5 - 0.01, abs=1e-5)
 
 
-def test_bodies_of_rigid_joints_are_one_coordinate():
-    """J = J_a + n^2 m, weight and friction through n, from either end of the joint."""
+def test_rigid_joint_reduces_two_bodies_to_one_coordinate():
+    """J = J_a + n^2 m, with gravity and friction scaled by n, for both orientations of the joint."""
     n, J, m = 0.02, 1e-4, 2.0
     bodies = {
         "a": {"inertia": J, "dry": 1e-3},
@@ -173,7 +173,7 @@ def test_bodies_of_rigid_joints_are_one_coordinate():
         assert s.m.y[1] == pytest.approx(n * s.m.y[0], rel=1e-12)
 
 
-def test_a_fixed_body_is_the_frame():
+def test_fixed_body_is_part_of_the_frame():
     machine = Description.model_validate(
         {"bodies": {"base": {"fixed": True}, "a": {"mass": 1.0}}, "sensors": SEEN,
          "joints": {"spring": {"from": "base", "to": "a", "stiffness": 100.0}}}
@@ -184,7 +184,7 @@ def test_a_fixed_body_is_the_frame():
     np.testing.assert_allclose(A, [[0.0, 1.0], [-100.0, 0.0]])
 
 
-def test_a_loop_of_springs_keeps_its_energy():
+def test_loop_of_springs_conserves_energy():
     springs = {"k1": ("a", "b"), "k2": ("b", "c"), "k3": ("a", "c")}
     joints = {name: {"from": a, "to": b, "stiffness": 300.0} for name, (a, b) in springs.items()}
     p = params(1e-3, bodies={"a": {"mass": 1.0}, "b": {"mass": 2.0}, "c": {"mass": 0.5}}, joints=joints)
@@ -201,7 +201,7 @@ def test_a_loop_of_springs_keeps_its_energy():
     assert energy() == pytest.approx(first, rel=1e-9)
 
 
-def test_a_zero_of_the_low_pass_leads_the_current():
+def test_zero_of_the_drive_low_pass_appears_in_the_transfer_function():
     lag = {"body": "a", "gain": 1.0, "bandwidth_hz": 100.0, "zero": 1e-3}
     A, B = graph.state_space(params(1e-4, bodies={"a": {"mass": 2.0}}, drives={"m": lag}))
     for f in (10.0, 100.0, 400.0):
@@ -211,7 +211,7 @@ def test_a_zero_of_the_low_pass_leads_the_current():
 
 
 def reels(**change: Any) -> Any:
-    """Two reels on one tape; the first is driven and rubs."""
+    """Two reels on one tape; the first reel has the drive and viscous friction."""
     winds = {"core": 0.01, "thickness": 1e-3, "density": 1000.0, "width": 0.005}
     bodies = {
         "a": {"inertia": 4e-4, "radius": 0.03, "viscous": 1e-3, "reel": winds},
@@ -222,7 +222,7 @@ def reels(**change: Any) -> Any:
     return params(1e-4, bodies=bodies, joints=joints, drives=drives)
 
 
-def test_tape_between_two_reels_is_neither_made_nor_lost():
+def test_tape_length_between_two_reels_is_conserved():
     p = reels()
     s = started(p)
     s.m.volts[0] = 0.05
@@ -235,8 +235,8 @@ def test_tape_between_two_reels_is_neither_made_nor_lost():
         assert s.m.reel_J[k] == pytest.approx(reel_inertia(J, 5.0, s.m.reel_R[k], R), rel=1e-9)
 
 
-def test_half_the_step_winds_the_same():
-    """To a part in 1e5, with a drive and a bearing at the reel itself."""
+def test_halving_the_step_keeps_the_winding_motion():
+    """Relative difference below 1e-5, with drive and friction at the reel."""
     one, two = reels(), reels()._replace(h=5e-5)
     whole, half = started(one), started(two)
     for p, s, n in ((one, whole, 10_000), (two, half, 20_000)):
@@ -245,14 +245,14 @@ def test_half_the_step_winds_the_same():
     np.testing.assert_allclose(whole.m.x[:2], half.m.x[:2], rtol=1e-5)
 
 
-def test_a_substep_allocates_nothing(allocations):
+def test_substep_allocates_no_memory(allocations):
     p = reels()
     s = started(p)
     assert allocations(run, p, s, 1000) == allocations(run, p, s, 1)
 
 
-def test_a_constant_pull_is_a_force_that_goes_with_nothing():
-    """v = F t / m, and half of it through a ratio of two."""
+def test_constant_pull_accelerates_the_mass_through_the_ratio():
+    """v = F t / m with the mass reflected through the ratio."""
     for ratio in (1.0, 2.0):
         p = params(
             1e-3, bodies={"a": {"mass": 2.0}, "b": {"mass": 3.0, "pull": 0.7}},

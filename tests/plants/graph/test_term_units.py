@@ -1,4 +1,4 @@
-"""Units of the numbers of a term at a node."""
+"""Units of the parameters of a term at a node."""
 
 import pytest
 
@@ -14,14 +14,14 @@ MACHINE = Description.model_validate({
 
 
 @pytest.mark.parametrize(("node", "unit"), [("motor", "Nm"), ("carriage", "N")])
-def test_a_unit_follows_from_whether_the_node_turns(node, unit):
+def test_unit_depends_on_a_rotating_or_sliding_node(node, unit):
     assert unit_at(MACHINE, "friction.coulomb", node, "F_C") == unit
 
 
 @pytest.mark.parametrize(("size", "unit"), [("inertia", "Nm"), ("mass", "N")])
 @pytest.mark.parametrize("ends", [("frame", "part"), ("part", "frame"), ("wall", "part"), ("part", "wall")])
 @pytest.mark.parametrize("wall", ["inertia", "mass"])
-def test_a_joint_to_the_frame_has_the_unit_of_the_body_that_moves(size, unit, ends, wall):
+def test_joint_to_the_frame_has_the_unit_of_its_moving_body(size, unit, ends, wall):
     machine = Description.model_validate({
         "bodies": {"part": {size: 1.0}, "wall": {wall: 1.0, "fixed": True}},
         "joints": {"spring": {"from": ends[0], "to": ends[1], "stiffness": 10.0}},
@@ -35,7 +35,7 @@ def test_a_joint_to_the_frame_has_the_unit_of_the_body_that_moves(size, unit, en
     assert ends_turn(machine, "spring") == (unit == "Nm", unit == "Nm")
 
 
-def test_a_sensor_may_have_the_name_of_another_body():
+def test_sensor_with_the_name_of_another_body_keeps_its_unit():
     machine = Description.model_validate({
         "bodies": {"motor": {"inertia": 1e-4}, "carriage": {"mass": 1.0}},
         "joints": {"belt": {"from": "motor", "to": "carriage", "ratio": 0.01}},
@@ -44,11 +44,11 @@ def test_a_sensor_may_have_the_name_of_another_body():
     assert [turns_at(machine, sensor) for sensor in machine.sensors.values()] == [False, True]
 
 
-def test_what_is_no_element_has_no_body():
+def test_node_that_is_not_an_element_has_no_body():
     assert body_of(MACHINE, "loop") == ""
 
 
-def test_a_span_of_tape_is_a_length():
+def test_tape_span_has_linear_units():
     machine = Description.model_validate({
         "bodies": {"one": {"inertia": 1e-4, "radius": 0.02}, "two": {"inertia": 1e-4, "radius": 0.02}},
         "joints": {"tape": {"from": "one", "to": "two", "span": "open", "stiffness": 450.0}},
@@ -57,7 +57,7 @@ def test_a_span_of_tape_is_a_length():
     assert ends_turn(machine, "tape") == (False, False)
 
 
-def test_texts_with_units_become_si():
+def test_texts_with_units_are_converted_to_si():
     entry = {"term": "friction.stribeck", "node": "motor", "F_s": "20 mNm", "v_s": "30 deg/s"}
     assert entry_in_si(MACHINE, entry) == pytest.approx({**entry, "F_s": 0.02, "v_s": 0.5235987756})
     given = {"term": "friction.quadratic", "node": "carriage", "Q": "2 N*s^2/m^2"}
@@ -65,17 +65,17 @@ def test_texts_with_units_become_si():
 
 
 @pytest.mark.parametrize("value", [0.02, "0.02"])
-def test_numbers_are_si(value):
+def test_plain_numbers_are_read_as_si(value):
     entry = {"term": "friction.coulomb", "node": "motor", "F_C": value}
     assert entry_in_si(MACHINE, entry)["F_C"] == 0.02
 
 
-def test_a_unit_that_does_not_fit_is_refused():
+def test_unit_of_another_dimension_is_refused():
     with pytest.raises(ValueError, match="F_C: '3 N' is not a quantity in Nm"):
         entry_in_si(MACHINE, {"term": "friction.coulomb", "node": "motor", "F_C": "3 N"})
 
 
-def test_every_unit_can_be_written():
+def test_every_unit_is_known_to_the_converter():
     from rtctl.config.units import convert
 
     assert all(convert(1.0, unit, unit) == 1.0 for pair in DIMENSIONS.values() for unit in pair)

@@ -1,4 +1,4 @@
-"""Units of a description follow from the kind of element."""
+"""Units of a description depend on the kind of the element."""
 
 import copy
 
@@ -25,7 +25,7 @@ TAPE = {
 }  # fmt: skip
 
 
-def test_quantities_become_numbers_in_si():
+def test_quantities_are_converted_to_si_numbers():
     machine = Description.model_validate(TAPE)
     values = dict(machine.paths())
     wanted = {
@@ -47,14 +47,14 @@ def test_quantities_become_numbers_in_si():
         ("drives", "motor", "zero", "3 V"),
     ],
 )  # fmt: skip
-def test_a_unit_that_does_not_fit_is_refused_with_its_path(group, name, key, value):
+def test_unit_of_another_dimension_is_refused_with_its_path(group, name, key, value):
     data = copy.deepcopy(TAPE)
     data[group][name][key] = value
     with pytest.raises(ValidationError, match=rf"{group}\.{name}\.{key}: "):
         Description.model_validate(data)
 
 
-def test_units_by_kind():
+def test_units_of_joints_drives_and_sensors():
     assert joint_units(True, False) == {"ratio": "m/rad", "stiffness": "N/m", "damping": "N*s/m"}
     assert joint_units(True, True) == {"ratio": "", "stiffness": "Nm/rad", "damping": "Nm*s/rad"}
     assert drive_units("force", "%", True)["gain"] == "Nm/percent"
@@ -63,7 +63,7 @@ def test_units_by_kind():
 
 
 @pytest.mark.parametrize(("per_unit", "step"), [(1, "2 mm"), (-1, "2 mm"), (1000.0, 2.0)])
-def test_a_step_has_a_unit_where_the_column_is_in_si(per_unit, step):
+def test_resolution_is_converted_to_si(per_unit, step):
     data = copy.deepcopy(TAPE)
     data["sensors"]["scale"] = {"body": "table", "column": "s", "per_unit": per_unit, "resolution": step}
     sensor = Description.model_validate(data).sensors["scale"]
@@ -71,7 +71,7 @@ def test_a_step_has_a_unit_where_the_column_is_in_si(per_unit, step):
 
 
 @pytest.mark.parametrize("change", [{"measures": "speed", "counts_per_unit": 100.0}, {"counts_per_unit": None}])
-def test_only_a_counter_may_lack_a_direction(change):
+def test_only_an_edge_counter_may_have_no_direction(change):
     data = copy.deepcopy(TAPE)
     data["sensors"]["encoder"] |= {"direction": False, **change}
     with pytest.raises(ValidationError, match="direction: false is for a counter of edges"):

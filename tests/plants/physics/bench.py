@@ -1,6 +1,6 @@
-"""A bench for terms of physics: each plant with any term at any node, driven by what a test writes on its inputs.
+"""Test bench for physics terms: a plant with any term at any node, driven open loop by the inputs of a test.
 
-One compiled run a plant, every term of the bench in a slot that is chosen by its number.
+One compiled run per plant; the number of a slot selects its term.
 """
 
 from functools import cache
@@ -180,11 +180,11 @@ def kinetic(s: Any, v: np.ndarray) -> np.ndarray:
 
 
 def first(kind: str, term: str) -> str:
-    """The first node where a term can stand."""
+    """First node of a term on a plant."""
     return nodes(TERMS[term], kind)[0]
 
 
-FORCE = {  # what moves each node, in its own unit; about its dry friction where it has some
+FORCE = {  # force or torque that moves each node, near its dry friction
     "axis": {"carriage": 20.4},
     "ivu": {"motor1": 2.5e-3, "motor2": 2.5e-3, "reel1": 2.5e-3, "reel2": 2.5e-3, "capstan": 1e-3},
     "ldu": {"motor": 6e-4, "wheel": 0.02, "capstan": 0.022, "carriage": 7.3},
@@ -201,7 +201,7 @@ INERTIA = {
 
 
 def usual(term: str, kind: str, node: str | None = None, **changes: Any) -> Settings:
-    """A term of the size that such a machine may well have."""
+    """A term of typical size for the machine."""
     node = node or first(kind, term)
     F, J = FORCE[kind].get(node, 0.0), INERTIA[kind].get(node, 0.0)
     V, X = SPEED[kind].get(node, SPEED_OF[kind]), TRAVEL[kind].get(node, TRAVEL_OF[kind])
@@ -237,7 +237,7 @@ def usual(term: str, kind: str, node: str | None = None, **changes: Any) -> Sett
     return TERMS[term].settings(node=node, **{**values[term], **changes})
 
 
-NOTHING: dict[str, dict[str, float]] = {  # the size at which each is not there
+NOTHING: dict[str, dict[str, float]] = {  # parameters for zero effect
     "friction.coulomb": {"F_C": 0.0},
     "friction.viscous": {"B": 0.0},
     "friction.asymmetry": {"a": 0.0, "B_a": 0.0},
@@ -261,7 +261,7 @@ DRY = {("axis", "carriage"): 20.4, ("ivu", "motor1"): 2.4e-3, ("ivu", "motor2"):
 
 
 def nothing(term: str, kind: str, node: str | None = None) -> Settings:
-    """The term where it does nothing."""
+    """The term with zero effect."""
     node = node or first(kind, term)
     if term == "friction.stribeck":
         return usual(term, kind, node, F_s=DRY.get((kind, node), 0.0))
@@ -269,7 +269,7 @@ def nothing(term: str, kind: str, node: str | None = None) -> Settings:
 
 
 def moves(kind: str, seconds: float = 2.0, tick: float = 1e-3, loose: bool = False) -> np.ndarray:
-    """Inputs (n, nu) that drive a machine to and fro, with a tape that is taut or, where `loose`, goes slack."""
+    """Inputs (n, nu) for a reciprocating motion, with a taut tape or, with `loose`, a tape that goes slack."""
     t = np.arange(round(seconds / tick)) * tick
     there = np.sign(np.sin(4 * np.pi * t) + 0.3)
     if kind == "ivu":
@@ -278,4 +278,4 @@ def moves(kind: str, seconds: float = 2.0, tick: float = 1e-3, loose: bool = Fal
     return {"axis": 2.0, "ldu": 0.12}[kind] * there * (1 - 0.3 * np.cos(1.4 * np.pi * t))
 
 
-SUBSTEPS = {"axis": 2, "ivu": 4, "ldu": 20}  # a millisecond, as the emulators have them
+SUBSTEPS = {"axis": 2, "ivu": 4, "ldu": 20}  # per millisecond, as in the emulators

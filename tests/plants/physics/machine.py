@@ -1,4 +1,4 @@
-"""A described machine with terms of physics at its nodes, driven open loop, uncompiled."""
+"""A described machine with physics terms at its nodes, driven open loop, uncompiled."""
 
 import importlib
 from typing import Any, NamedTuple
@@ -64,7 +64,7 @@ def settings(term: str, node: str, **values: Any) -> Any:
 
 
 def run(machine: dict, terms: list, u: np.ndarray, h: float = H) -> Run:
-    """Commands u (n, drives) for a substep of `h` s each."""
+    """Run with commands u (n, drives), each for a substep of `h` s."""
     there, _ = sprung(Description.model_validate(machine), terms)
     place, values = layout(there), dict(there.paths())
     p = params.build(place, values, h)

@@ -1,6 +1,6 @@
-"""A stand for terms that act on commands, readings and wheels: a plant with any of them, driven open loop by volts.
+"""Test stand for terms at commands, readings and wheels: a plant with any such term, driven open loop by volts.
 
-One compiled run a plant; a slot says by its number which term stands in it.
+One compiled run per plant; the number of a slot selects its term.
 """
 
 from functools import cache
@@ -55,7 +55,7 @@ REQUIRED = {
     "sensor.rectified": {"share": 0.0},
     "sensor.scale": {"relative": 0.0},
     "geometry.radius_change": {"d": 0.0},
-}  # of each term: no effect at all
+}  # parameters for zero effect
 
 TEXT = '''
 from rtctl.idiom import tick
@@ -104,8 +104,8 @@ class Run(NamedTuple):
     s: Any
 
 
-def of(kind: str) -> list[Term]:
-    """Terms that can stand in a plant."""
+def terms_of(kind: str) -> list[Term]:
+    """Terms that have a node on a plant."""
     return [term for term in TERMS.values() if nodes(term, kind)]
 
 
@@ -114,7 +114,7 @@ def source(kind: str) -> str:
     sites = []
     for site in SITES:
         lines = ["pass"]
-        for number, term in enumerate(of(kind), 1):
+        for number, term in enumerate(terms_of(kind), 1):
             line, field = term.act_at(site, kind), term.name.replace(".", "_")
             if line is not None:
                 filled = line.format(
@@ -133,7 +133,7 @@ def compiled(kind: str) -> tuple[Any, np.dtype, np.dtype]:
     exec(source(kind), scope)
     slot: dict[str, Any] = {"number": int, "i": int, "l": int, "c": int, "r": float}
     memory: dict[str, Any] = {"spare": float}
-    for term in of(kind):
+    for term in terms_of(kind):
         field = term.name.replace(".", "_")
         slot[field] = record_dtype(term.build(make(term.name, kind), 1e-3))
         if term.state is not None:
@@ -142,7 +142,7 @@ def compiled(kind: str) -> tuple[Any, np.dtype, np.dtype]:
 
 
 def make(name: str, kind: str, node: str | None = None, **values: Any) -> Any:
-    """Settings of a term at a node, its first one where not told; what is not told has no effect."""
+    """Settings of a term at a node, by default at its first node; parameters not given have zero effect."""
     term = TERMS[name]
     return term.settings(node=node or nodes(term, kind)[0], **{**REQUIRED[name], **values})
 
@@ -168,7 +168,7 @@ def run(
     x: dict[int, float] | None = None,
     **parameters: float,
 ) -> Run:
-    """Drive a machine by volts (n, nu), each row held for `tick` s; `x` gives states that do not start at zero."""
+    """Drive a machine by volts (n, nu), each row held for `tick` s; `x` gives nonzero initial states."""
     function, slot, memory = compiled(kind)
     p, s = plant(kind, tick / substeps, **parameters)
     nq = s.m.nq
@@ -177,7 +177,7 @@ def run(
         if nq <= i < 2 * nq:
             s.m.v_before[i - nq] = value
     q, z = np.zeros(SLOTS, slot).view(np.recarray), np.zeros(SLOTS, memory).view(np.recarray)
-    names = [term.name for term in of(kind)]
+    names = [term.name for term in terms_of(kind)]
     for n, settings in enumerate(ordered(terms)):
         name, spot = settings.term, place(kind, settings.node)  # type: ignore[attr-defined]
         q[n].number, q[n].i, q[n].l, q[n].c = names.index(name) + 1, spot.node, spot.link, spot.channel
@@ -190,7 +190,7 @@ def run(
 
 
 def excitation(kind: str, n: int = 1500, tick: float = 2e-3) -> np.ndarray:
-    """Volts (n, nu) that move the machine to and fro: sums of sines, of both signs, the tape kept taut."""
+    """Volts (n, nu) for a reciprocating motion: sums of sines, of both signs, with a taut tape."""
     t = np.arange(n) * tick
     wave = np.sin(2 * np.pi * 0.7 * t) + 0.6 * np.sin(2 * np.pi * 3.1 * t)
     if kind == "ivu":
@@ -199,7 +199,7 @@ def excitation(kind: str, n: int = 1500, tick: float = 2e-3) -> np.ndarray:
 
 
 def counts(kind: str, y: np.ndarray) -> np.ndarray:
-    """Readings (n, ny) as the counters show them."""
+    """Readings (n, ny) in counts."""
     return np.floor(y / np.array(COUNT[kind]))
 
 

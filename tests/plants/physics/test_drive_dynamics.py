@@ -1,4 +1,4 @@
-"""Lag and warmth: exact responses whatever the step, and no effect where there is none."""
+"""Drive lag and thermal derating: exact responses for any step, no effect at size zero."""
 
 import math
 from types import SimpleNamespace
@@ -20,7 +20,7 @@ def zeros(dtype: np.dtype) -> np.record:
 
 
 def step_response(t: np.ndarray, tau: float, order: int, zeta: float) -> np.ndarray:
-    """Of the lag to one volt at t = 0, in closed form."""
+    """Closed-form response of the lag to a step of 1 V at t = 0."""
     if order == 1:
         return 1 - np.exp(-t / tau)
     x = 2.0 * zeta * t / tau
@@ -30,7 +30,7 @@ def step_response(t: np.ndarray, tau: float, order: int, zeta: float) -> np.ndar
 
 @settings(deadline=None)
 @given(st.floats(1e-4, 1e-1), st.sampled_from([1, 2]), st.sampled_from([0.1, 0.7, 1.5, 6.0]), st.floats(1e-4, 1e-2))
-def test_lag_gives_the_mean_of_the_response(tau, order, zeta, h):
+def test_lag_outputs_the_mean_response_over_each_substep(tau, order, zeta, h):
     h = min(h, 20.0 * tau / max(2.0 * zeta, 1.0))  # beyond, the closed form below overflows
     p, s = build_lag(LagSettings(node="drive", tau=tau, order=order, zeta=zeta), h), zeros(drive_dynamics.LAG_STATE)
     fine = np.linspace(0, h, 4001)
@@ -42,7 +42,7 @@ def test_lag_gives_the_mean_of_the_response(tau, order, zeta, h):
 
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("zeta", [0.3, 1.0, 1.0 + 1e-9, 3.0])
-def test_lag_fades_to_nothing_and_ends_at_the_command(order, zeta):
+def test_lag_vanishes_linearly_with_tau_and_settles_at_the_command(order, zeta):
     def first(tau: float) -> float:
         p = build_lag(LagSettings(node="drive", tau=tau, order=order, zeta=zeta), 1e-3)
         return float(drive_dynamics.lag(p, zeros(drive_dynamics.LAG_STATE), 1.0))
@@ -50,13 +50,13 @@ def test_lag_fades_to_nothing_and_ends_at_the_command(order, zeta):
     assert first(0.0) == 1.0
     change = [1.0 - first(tau) for tau in (1e-9, 1e-6, 1e-5)]
     assert change[0] < 1e-5 and change[0] < change[1] < change[2]
-    assert change[2] / change[1] == pytest.approx(10.0, rel=1e-3)  # in proportion to tau: good for a fit
+    assert change[2] / change[1] == pytest.approx(10.0, rel=1e-3)  # proportional to tau, smooth for a fit
     p, s = build_lag(LagSettings(node="drive", tau=0.01, order=order, zeta=zeta), 1e-3), zeros(drive_dynamics.LAG_STATE)
     out = [drive_dynamics.lag(p, s, 2.0) for _ in range(1000)]
     assert out[-1] == pytest.approx(2.0, rel=1e-4)
 
 
-def test_a_critical_lag_is_between_its_neighbours():
+def test_lag_is_continuous_across_critical_damping():
     out = []
     for zeta in (0.999, 1.0, 1.001):
         p, s = build_lag(LagSettings(node="drive", tau=0.01, order=2, zeta=zeta), 1e-3), zeros(drive_dynamics.LAG_STATE)
@@ -69,7 +69,7 @@ def warm(node: str, a: float = 0.5, tau: float = 2.0) -> tuple:
     return p, zeros(drive_dynamics.THERMAL_STATE)
 
 
-def test_gain_falls_as_it_warms_and_comes_back():
+def test_thermal_gain_falls_under_load_and_recovers():
     p, s = warm("drive")
     gains = []
     for k in range(2000):
@@ -81,13 +81,13 @@ def test_gain_falls_as_it_warms_and_comes_back():
     assert gains[200] == pytest.approx(math.exp(-0.5 * (1 - math.exp(-1.0))), rel=1e-9)  # after tau
     assert gains[999] == pytest.approx(math.exp(-0.5), rel=1e-2)
     assert gains[-1] > 0.98
-    assert drive_dynamics.thermal_friction(p, s, 3.0, p.friction) == 3.0  # that of a drive leaves friction alone
+    assert drive_dynamics.thermal_friction(p, s, 3.0, p.friction) == 3.0  # a term at a drive does not change friction
 
 
 @pytest.mark.parametrize(
     ("form", "left"), [("exponential", math.exp(-0.5)), ("linear", 0.5), ("hyperbolic", 1.0 / 1.5)]
 )
-def test_what_is_left_of_a_warm_drive_by_the_form_of_the_loss(form, left):
+def test_final_thermal_gain_of_each_loss_form(form, left):
     def gain(a: float, volts: float = 2.0) -> float:
         p = build_thermal(ThermalSettings(node="drive", a=a, tau=2.0, V_ref=2.0, form=form), 1e-2)
         s = zeros(drive_dynamics.THERMAL_STATE)
@@ -97,11 +97,11 @@ def test_what_is_left_of_a_warm_drive_by_the_form_of_the_loss(form, left):
         return u[0] / volts
 
     assert gain(0.5) == pytest.approx(left, rel=1e-6)
-    assert gain(0.01) == pytest.approx(0.99, rel=1e-3)  # of a small loss the form says nothing
-    assert 0.0 < gain(2.0, 20.0) < 0.1  # however warm, it never pushes back
+    assert gain(0.01) == pytest.approx(0.99, rel=1e-3)  # the forms agree for a small loss
+    assert 0.0 < gain(2.0, 20.0) < 0.1  # the gain never becomes negative
 
 
-def test_friction_falls_at_a_motor_and_its_gain_stays():
+def test_thermal_term_at_a_motor_lowers_friction_and_keeps_the_gain():
     p, s = warm("motor2")
     for _ in range(200):
         u = np.array([9.0, 2.0])
@@ -112,7 +112,7 @@ def test_friction_falls_at_a_motor_and_its_gain_stays():
     )
 
 
-def test_a_warm_drive_runs_easier_where_its_own_motor_rubs():
+def test_thermal_ease_of_a_drive_lowers_the_friction_of_its_motor():
     p = build_thermal(ThermalSettings(node="drive2", a=0.0, ease=0.4, tau=2.0, V_ref=2.0), 1e-2)
     s = zeros(drive_dynamics.THERMAL_STATE)
     for _ in range(4000):
@@ -125,7 +125,7 @@ def test_a_warm_drive_runs_easier_where_its_own_motor_rubs():
     ]  # fmt: skip
 
 
-def test_each_drive_is_warmed_by_its_own_motor():
+def test_thermal_gain_of_a_drive_depends_only_on_its_command():
     u = np.tile([0.5, 3.0], (500, 1))
     base = stand.run("ivu", [], u).x[-1]
     for node, i, other in (("drive1", 10, 12), ("drive2", 12, 10)):
@@ -136,7 +136,7 @@ def test_each_drive_is_warmed_by_its_own_motor():
         assert x[other] == pytest.approx(base[other], rel=1e-9)
 
 
-def test_a_drive_of_any_name_loses_its_gain():
+def test_thermal_term_acts_on_a_drive_of_any_name():
     import machine
 
     r = machine.run(machine.SCREW, [machine.settings("drive.thermal", "amplifier", a=0.4, tau=0.05)], np.ones(400))
@@ -144,7 +144,7 @@ def test_a_drive_of_any_name_loses_its_gain():
     assert r.u[-1, 0] == pytest.approx(math.exp(-0.4), rel=1e-3)
 
 
-def test_a_body_of_a_described_machine_warms_by_all_drives():
+def test_thermal_friction_of_a_body_depends_on_all_drives():
     p, s = warm("carriage", a=0.4)
     m = SimpleNamespace(nu=2, volts=np.array([2.0, 0.0, 0.0, 0.0]), dry=np.array([3.0, 5.0]))
     before = m.volts.copy()
@@ -154,5 +154,5 @@ def test_a_body_of_a_described_machine_warms_by_all_drives():
             left = drive_dynamics.thermal_dry(p, s, m, 1, -1)
         at_a_drive = drive_dynamics.thermal_dry(p, zeros(drive_dynamics.THERMAL_STATE), m, 1, 0)
     assert left == pytest.approx(5.0 * math.exp(-0.4), rel=1e-3)
-    assert (m.volts == before).all()  # a body takes nothing from a drive
-    assert at_a_drive == 5.0  # there it is `ease` that counts
+    assert (m.volts == before).all()  # a term at a body does not change the command
+    assert at_a_drive == 5.0  # at a drive only `ease` lowers friction

@@ -1,4 +1,4 @@
-"""Friction: its limits and signs, that it only takes energy, and that a mechanic can read what it is."""
+"""Friction terms: limits, signs, dissipation, documentation for the mechanic."""
 
 import math
 import re
@@ -33,9 +33,9 @@ def viscous(B: float) -> friction.ViscousParams:
 
 
 @pytest.mark.parametrize(("form", "share"), [("gaussian", 1 / math.e), ("exponential", 1 / math.e), ("tustin", 0.5)])
-def test_stribeck_falls_by_its_form(form, share):
+def test_stribeck_curve_falls_by_its_form(form, share):
     p = stribeck(form=form)
-    assert friction.stribeck(p, 2.0, 0.0) == pytest.approx(1.0)  # F_s at rest, on top of the base
+    assert friction.stribeck(p, 2.0, 0.0) == pytest.approx(1.0)  # F_s at rest less the base
     assert friction.stribeck(p, 2.0, 0.5) == pytest.approx(share)
     assert friction.stribeck(p, 2.0, -0.5) == pytest.approx(share)
     assert friction.stribeck(p, 2.0, 500.0) == pytest.approx(0.0, abs=2e-6)
@@ -43,7 +43,7 @@ def test_stribeck_falls_by_its_form(form, share):
 
 @settings(deadline=None)
 @given(st.sampled_from(FORMS), st.floats(0, 10), st.floats(0, 10), st.floats(-100, 100), st.floats(-100, 100))
-def test_stribeck_lies_between_the_two_and_falls_with_speed(form, F_s, base, v, w):
+def test_stribeck_force_lies_between_static_and_base_level_and_decays_with_speed(form, F_s, base, v, w):
     p = stribeck(F_s=F_s, form=form)
     total = base + friction.stribeck(p, base, v)
     assert min(F_s, base) - 1e-9 <= total <= max(F_s, base) + 1e-9
@@ -53,22 +53,22 @@ def test_stribeck_lies_between_the_two_and_falls_with_speed(form, F_s, base, v, 
 
 @settings(deadline=None)
 @given(st.floats(0, 1e3), st.floats(-1e3, 1e3))
-def test_viscous_opposes_in_proportion(B, v):
+def test_viscous_friction_is_proportional_and_opposes_motion(B, v):
     force = friction.viscous(viscous(B), v)
     assert force == -B * v
     assert force * v <= 0.0
 
 
-def test_coulomb_adds_to_the_limit():
+def test_coulomb_term_adds_to_the_friction_limit():
     assert friction.coulomb(coulomb(0.3)) == 0.3
 
 
 @pytest.mark.parametrize("F", [-F_C, -2 * F_C])
-def test_less_dry_friction_than_none_is_none(F):
+def test_negative_total_dry_friction_is_limited_to_zero(F):
     s = plant()
     s.m.x[1] = s.m.v_before[0] = 0.1
     free_run(s, coulomb(F), viscous(-203.5), stribeck(F_s=F_C, v_s=0.01), 1000)
-    assert s.m.x[1] == pytest.approx(0.1, rel=1e-6)  # nothing brakes it and nothing drives it
+    assert s.m.x[1] == pytest.approx(0.1, rel=1e-6)  # no braking and no driving force
 
 
 @pytest.mark.parametrize(
@@ -81,14 +81,14 @@ def test_less_dry_friction_than_none_is_none(F):
         (friction.CoulombSettings, {"F_C": math.nan}),
     ],
 )
-def test_settings_without_sense_are_refused(model, values):
+def test_invalid_settings_are_refused(model, values):
     with pytest.raises(ValidationError):
         model(node="carriage", **values)
 
 
 @tick
 def substep(s, dry, brake, stick):
-    """The axis with all three terms, as a generated plant calls them; with sizes of nothing they are not there."""
+    """Substep of the axis with all three terms, as in a generated plant; sizes of zero switch a term off."""
     linear.midpoint(s.m)
     s.m.dry[0] += friction.coulomb(dry)
     s.m.f[0] += friction.viscous(brake, s.m.vm[0])
@@ -133,14 +133,14 @@ NOTHING = {"dry": coulomb(0.0), "brake": viscous(0.0), "stick": stribeck(F_s=F_C
     st.floats(1e-3, 1),
     st.sampled_from(FORMS),
 )
-def test_no_friction_ever_makes_a_free_axis_faster(v, F, B, F_s, v_s, form):
+def test_friction_never_accelerates_a_free_axis(v, F, B, F_s, v_s, form):
     s = plant()
     s.m.x[1] = s.m.v_before[0] = v
     speed = abs(v)
     for _ in range(30):
         free_run(s, coulomb(F), viscous(B), stribeck(F_s, v_s, form), 10)
         assert abs(s.m.x[1]) <= speed * (1 + 1e-12)
-        assert s.m.x[1] * v >= -1e-9  # it stops, it does not turn
+        assert s.m.x[1] * v >= -1e-9  # no reversal
         speed = abs(s.m.x[1])
 
 
@@ -161,7 +161,7 @@ def recording(**terms: Any) -> np.ndarray:
         *({"stick": stribeck(1.5 * F_C, 0.01, form)} for form in FORMS),
     ],
 )
-def test_a_term_of_usual_size_is_seen_in_a_closed_loop(term):
+def test_friction_of_typical_size_is_visible_in_a_closed_loop(term):
     base = recording()
     assert 49_000 < base.max() < 51_000  # the loop works
     assert np.abs(recording(**term) - base).max() > 1
@@ -173,7 +173,7 @@ def test_forms_of_stribeck_differ_in_a_closed_loop():
     assert np.abs(traces[0] - traces[2]).max() > 1
 
 
-def test_every_term_is_explained():
+def test_every_friction_term_is_documented():
     for name, term in TERMS.items():
         assert name == term.name == term.settings.model_fields["term"].default
         assert len(term.words) > 20 and len(term.equation) > 4 and len(term.source) > 4

@@ -1,4 +1,4 @@
-"""A reel that fills: the same as what the plant does by itself with a thickness of tape."""
+"""Radius change of a reel: equal to the plant with a tape thickness."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ ROUND = ripple_tape.build_reel(ripple_tape.ReelSettings(node="reel2", e=0.0), 5e
 
 @tick
 def wind(p, s, volts, substeps, x, ripple):
-    """The plant with its own radii that follow the tape, and a second reel out of round."""
+    """Run of the plant with its variable radii and an eccentric second reel."""
     m = s.m
     for k in range(volts.shape[0]):
         for _ in range(substeps):
@@ -30,15 +30,15 @@ def wind(p, s, volts, substeps, x, ripple):
 
 
 def volts(n: int = 1500) -> np.ndarray:
-    """To and fro over several turns of the reels."""
+    """Volts (n, 2) for a reciprocating motion over several turns of the reels."""
     wave = np.sin(2 * np.pi * np.arange(n) / n)
     return np.stack([2.0 + 6.0 * wave, 2.0 - 6.0 * wave], axis=1)
 
 
 @pytest.mark.parametrize(("radii", "within"), [({"R1": 0.035, "R2": 0.028}, 0.06), ({}, 0.2)])
 @pytest.mark.parametrize("d", [2e-4, 1e-3])
-def test_both_reels_are_the_plant_with_a_thickness(d, radii, within):
-    """Over four to nine turns at the longest substep in use; the second set has a reel that is nearly empty."""
+def test_radius_change_of_both_reels_equals_the_plant_with_a_tape_thickness(d, radii, within):
+    """Four to nine turns at the longest substep in use; the second set has a nearly empty reel."""
     u = volts()
     terms = [stand.make("geometry.radius_change", "ivu", node, d=d) for node in ("reel1", "reel2")]
     got = stand.run("ivu", terms, u, d_tape=0.0, **radii).x
@@ -53,7 +53,7 @@ def test_both_reels_are_the_plant_with_a_thickness(d, radii, within):
 
 
 @pytest.mark.parametrize("node", ["reel1", "reel2"])
-def test_of_one_tape_both_reels_grow(node):
+def test_option_other_changes_the_radius_of_both_reels(node):
     both = [stand.make("geometry.radius_change", "ivu", reel, d=5e-4) for reel in ("reel1", "reel2")]
     one = stand.make("geometry.radius_change", "ivu", node, d=5e-4, other=1.0)
     many, few = (stand.run("ivu", terms, volts(), d_tape=0.0).x for terms in (both, [one]))
@@ -61,7 +61,7 @@ def test_of_one_tape_both_reels_grow(node):
     assert np.abs(few - many).max() < 0.02 * np.abs(few - alone).max()
 
 
-def test_the_plant_tells_the_tension_on_its_true_radius():
+def test_plant_computes_the_tension_at_the_true_radius():
     p, s = stand.plant("ivu", 2.5e-4, d_tape=1e-3)
     wind(p, s, volts(600), 8, np.zeros((600, 14)), ROUND)
     linear.midpoint(s.m)
@@ -75,7 +75,7 @@ def test_the_plant_tells_the_tension_on_its_true_radius():
 
 
 @pytest.mark.parametrize("node", ["reel1", "reel2"])
-def test_it_is_in_proportion_to_the_thickness(node):
+def test_radius_change_is_proportional_to_the_thickness(node):
     u = volts(600)
 
     def change(d: float) -> np.ndarray:
@@ -87,7 +87,7 @@ def test_it_is_in_proportion_to_the_thickness(node):
     assert np.allclose(two[:, :5], 2 * one[:, :5], atol=0.02 * np.abs(one[:, :5]).max())
 
 
-def test_an_empty_reel_gets_no_smaller():
+def test_empty_reel_keeps_the_core_radius():
     _, s = stand.plant("ivu", 2.5e-4, d_tape=0.0)
     p = geometry.build_radius_change(geometry.RadiusChangeSettings(node="reel1", d=1e-3), 2.5e-4)
     s.m.qm[ivu.REEL1], s.m.qm[ivu.CAPSTAN] = -500.0, -500.0 * 0.02 / 0.0125
@@ -97,9 +97,9 @@ def test_an_empty_reel_gets_no_smaller():
     assert wound == pytest.approx(-(0.029 * turns + 0.02 * (500.0 - turns)))
 
 
-def test_a_ripple_pulls_at_the_radius_and_turns_the_inertia_that_the_reel_has():
-    """Left to itself the ripple would pull at the radius and turn the inertia of the machine at its start: that was off
-    by three times what it does."""
+def test_reel_ripple_uses_the_present_radius_and_inertia():
+    """Ripple combined with radius change. With initial radius and inertia the error was three times
+    the effect."""
     ripple = stand.make("ripple.reel", "ivu", "reel2", e=4e-4, phi=0.3)
     tape = stand.make("geometry.radius_change", "ivu", "reel2", d=5e-4, other=1.0)
     u, own = volts(), []
@@ -113,8 +113,8 @@ def test_a_ripple_pulls_at_the_radius_and_turns_the_inertia_that_the_reel_has():
     assert np.abs(got - expected).max() < 0.4 * np.abs(expected).max()
 
 
-def test_what_a_reel_winds_is_there_before_anything_asks_for_its_tension():
-    """Or creep and friction under load would see the tension of another tape."""
+def test_winding_terms_run_before_the_terms_that_use_the_tension():
+    """In another order, creep and load-dependent friction would use a stale tension."""
     names = list(TERMS)
     winding = ("geometry.radius_change", "ripple.reel", "ripple.capstan")
     contacts = ("transmission.slip", "transmission.creep")

@@ -1,4 +1,4 @@
-"""Errors along the guide: at their place, zero where the machine starts, seen by the scale alone."""
+"""Guide errors: at their position, zero at the start, visible only at the scale."""
 
 import math
 
@@ -27,7 +27,7 @@ def dirt(A: float, at: float, width: float = 1e-3) -> guide.DirtParams:
 
 @settings(deadline=None)
 @given(st.floats(-1e-3, 1e-3), st.floats(-4, 4), st.floats(-2, 2), st.floats(0.01, 1))
-def test_thickness_returns_every_wavelength(A, phi, x, wavelength):
+def test_thickness_error_is_periodic_and_zero_at_the_start(A, phi, x, wavelength):
     p = thickness(A, wavelength, phi)
     assert guide.thickness(p, 0.0) == pytest.approx(0.0, abs=1e-18)
     assert abs(guide.thickness(p, x)) <= 2 * abs(A)
@@ -35,8 +35,8 @@ def test_thickness_returns_every_wavelength(A, phi, x, wavelength):
 
 
 @pytest.mark.parametrize("phi", [0.0, 1.0])
-def test_strip_is_the_length_of_the_path(phi):
-    """0.1 mm over 100 mm, as in figure 11.4, by the integral itself."""
+def test_strip_error_is_the_excess_path_length(phi):
+    """Waviness of 0.1 mm over 100 mm (figure 11.4), by numerical integration."""
     k = 2 * math.pi / 0.1
     x = np.linspace(0, 0.37, 100_001)
     slope = 1e-4 * k * np.cos(k * x + phi)
@@ -49,24 +49,24 @@ def test_strip_is_the_length_of_the_path(phi):
 
 @settings(deadline=None)
 @given(st.floats(0, 0.01), st.floats(-1, 1), st.floats(-1, 1), st.floats(-4, 4))
-def test_the_way_along_a_wavy_strip_only_grows(longer, x, y, phi):
+def test_path_along_a_wavy_strip_is_monotone(longer, x, y, phi):
     p = strip(longer, phi=phi)
     one, two = sorted((x, y))
     assert guide.strip(p, two) <= guide.strip(p, one) + 1e-15
 
 
-def test_dirt_is_at_its_place():
+def test_dirt_error_is_a_bell_at_its_position():
     p = dirt(2e-5, 0.1)
     assert guide.dirt(p, 0.1) == pytest.approx(2e-5)
     assert guide.dirt(p, 0.11) == pytest.approx(0.0, abs=1e-20)
     assert guide.dirt(p, 0.101) == guide.dirt(p, 0.099) == pytest.approx(2e-5 * math.exp(-0.5))
-    assert guide.dirt(dirt(2e-5, 0.0), 0.0) == 0.0  # it starts on it: zero there, off elsewhere
+    assert guide.dirt(dirt(2e-5, 0.0), 0.0) == 0.0  # start on the dirt: zero there, an offset elsewhere
     assert guide.dirt(dirt(2e-5, 0.0), 0.1) == pytest.approx(-2e-5)
 
 
 @pytest.mark.parametrize("node", ["carriage", "scale"])
 @pytest.mark.parametrize("name", ["guide.thickness", "guide.strip", "guide.dirt"])
-def test_only_the_scale_sees_it(name, node):
+def test_guide_error_changes_only_the_scale(name, node):
     u = stand.excitation("ldu")
     size = {"guide.strip": {"longer": 1e-4}, "guide.dirt": {"A": 1e-5, "at": 0.01}}.get(name, {"A": 1e-5})
     one, two = stand.run("ldu", [], u), stand.run("ldu", [stand.make(name, "ldu", node, **size)], u)

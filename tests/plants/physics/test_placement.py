@@ -1,4 +1,4 @@
-"""Nodes of the terms on the three plants, as they were before traits told them."""
+"""Nodes of the terms on the three plants, against the table that preceded the traits."""
 
 import pytest
 
@@ -40,12 +40,12 @@ FROZEN = {
 
 
 @pytest.mark.parametrize("name", TERMS)
-def test_a_term_stands_where_it_stood(name):
-    """What came later stands at no node of these plants."""
+def test_nodes_of_a_term_on_the_plants_are_frozen(name):
+    """Later terms have no node on these plants."""
     assert by_kind(TERMS[name]) == FROZEN.get(name, {})
 
 
-def test_the_traits_of_any_machine_say_where_a_term_stands():
+def test_nodes_of_a_term_follow_from_the_traits_of_the_elements():
     belt = (
         element("motor", "body", "turns driven dry"),
         element("carriage", "body", "slides load dry bounded"),
@@ -59,7 +59,7 @@ def test_the_traits_of_any_machine_say_where_a_term_stands():
     assert nodes(TERMS["friction.coulomb"], "no plant") == ()
 
 
-def test_the_first_stand_that_fits_counts():
+def test_first_matching_stand_is_used():
     found = standing(TERMS["ripple.encoder"], "axis", "sensor")
     assert found is not None and not found[0].usual and found[1].kind == "sensor"
     found = standing(TERMS["ripple.encoder"], "ldu", "encoder")
@@ -68,7 +68,7 @@ def test_the_first_stand_that_fits_counts():
     assert standing(TERMS["guide.dirt"], "ldu", "scale")[0].again
 
 
-def test_what_described_machines_are_asked_about_no_plant_is():
+def test_general_terms_are_offered_only_to_described_machines():
     drag, fan = TERMS["friction.quadratic"], (element("fan", "body", "turns general single"),)
     assert standing(drag, fan, "fan")[0].offered
     assert not any(standing(drag, kind, node)[0].offered for kind, there in by_kind(drag).items() for node in there)
@@ -77,13 +77,13 @@ def test_what_described_machines_are_asked_about_no_plant_is():
     }  # fmt: skip
 
 
-def test_a_supply_is_looked_for_at_one_drive_or_at_each():
+def test_supply_sag_is_offered_at_one_drive_in_both_ways():
     sag = TERMS["drive.supply_sag"]
     there = (element("one", "drive", "general force supply several"), element("two", "drive", "general force several"))
     assert [len(standing(sag, there, name)[0].ways) for name in ("one", "two")] == [2, 1]
     assert standing(sag, "axis", "drive")[0].ways == ()
 
 
-def test_friction_by_load_stands_at_springs_and_weights():
+def test_load_friction_is_offered_at_spring_loaded_and_heavy_bodies():
     there = tuple(element(name, "body", f"general turns {name}") for name in ("sprung", "heavy", "rotor"))
     assert nodes(TERMS["friction.load"], there) == ("sprung", "heavy")

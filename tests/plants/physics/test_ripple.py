@@ -1,4 +1,4 @@
-"""Cogging takes no work over a tooth, and an encoder off centre only shows what it shows."""
+"""Cogging does no work over a tooth; encoder errors change only the reading."""
 
 import math
 
@@ -25,7 +25,7 @@ def encoder(**values: float) -> ripple.EncoderParams:
 
 @settings(deadline=None)
 @given(phases, phases, phases, st.floats(-1, 1), st.floats(-1, 1), st.sampled_from([1.0, 5.0, 12.0]))
-def test_a_turn_of_cogging_takes_no_work(phi, phi2, phi3, A2, A3, teeth):
+def test_cogging_does_no_work_over_a_turn(phi, phi2, phi3, A2, A3, teeth):
     p = cogging(A=1.0, phi=phi, A2=A2, phi2=phi2, A3=A3, phi3=phi3, per_turn=teeth)
     q = np.linspace(0, TURN, 1001)[:-1]
     torque = np.array([ripple.cogging(p, x) for x in q])
@@ -34,7 +34,7 @@ def test_a_turn_of_cogging_takes_no_work(phi, phi2, phi3, A2, A3, teeth):
     assert ripple.cogging(p, 0.3 + TURN / teeth) == pytest.approx(ripple.cogging(p, 0.3), abs=1e-12)
 
 
-def test_cogging_is_what_it_says():
+def test_cogging_has_its_amplitude_phase_and_pitch():
     p = cogging(A=2.0, per_turn=7.0)
     assert ripple.cogging(p, 0.0) == 0.0
     assert ripple.cogging(p, TURN / 28) == pytest.approx(2.0)
@@ -42,8 +42,8 @@ def test_cogging_is_what_it_says():
     assert ripple.cogging(p, 0.015) == pytest.approx(-2.0)
 
 
-def test_a_free_motor_among_its_teeth_keeps_its_energy():
-    """A frictionless axis swings in a notch: kinetic and potential energy stay the same sum."""
+def test_frictionless_axis_with_cogging_conserves_energy():
+    """Oscillation in a cogging minimum: the sum of kinetic and potential energy is constant."""
     A, pitch, M = 50.0, 0.03, 95.1
     term = stand.make("ripple.cogging", "axis", A=A, phi=math.pi, turn=pitch)
     x = stand.run("axis", [term], np.zeros((20000, 1)), x={1: 0.05}, F_v=0.0, F_c=0.0).x
@@ -56,7 +56,7 @@ def test_a_free_motor_among_its_teeth_keeps_its_energy():
 
 @settings(deadline=None)
 @given(phases, phases, phases, st.floats(-100, 100), st.sampled_from([1.0, 2.0, 2500.0]))
-def test_encoder_error_returns_every_turn_and_starts_at_zero(phi, phi2, phi3, y, order):
+def test_encoder_error_is_periodic_and_starts_at_zero(phi, phi2, phi3, y, order):
     p = encoder(A=1e-2, phi=phi, A2=1e-3, phi2=phi2, A3=-1e-3, phi3=phi3, order=order)
     assert ripple.encoder(p, 0.0) == 0.0
     error = ripple.encoder(p, y) - y
@@ -65,7 +65,7 @@ def test_encoder_error_returns_every_turn_and_starts_at_zero(phi, phi2, phi3, y,
     assert ripple.encoder(encoder(phi=phi), y) == y
 
 
-def test_eccentricity_of_the_thesis_is_a_sine():
+def test_encoder_eccentricity_of_the_thesis_is_a_sine():
     """5 um on a graduation of 19 mm (11.5)."""
     p = encoder(A=5e-6 / 19e-3, phi=math.pi / 2)
     for theta in np.linspace(0, TURN, 50):
@@ -74,7 +74,7 @@ def test_eccentricity_of_the_thesis_is_a_sine():
 
 
 @pytest.mark.parametrize(("kind", "channel"), [("ivu", 0), ("ldu", 0), ("axis", 0)])
-def test_an_encoder_error_leaves_the_machine_alone(kind, channel):
+def test_encoder_error_changes_only_its_channel(kind, channel):
     u = stand.excitation(kind, 200)
     one, two = stand.run(kind, [], u), stand.run(kind, [stand.make("ripple.encoder", kind, A=1e-3)], u)
     assert np.array_equal(one.x, two.x)
@@ -82,7 +82,7 @@ def test_an_encoder_error_leaves_the_machine_alone(kind, channel):
     assert changed[channel] and changed.sum() == 1
 
 
-def test_a_sensor_of_speed_shows_the_rate_of_what_a_position_would_show():
+def test_encoder_error_of_a_speed_sensor_is_the_rate_of_the_position_error():
     p = ripple.build_encoder(
         ripple.EncoderSettings(node="tacho", A=0.01, phi=0.3, order=2.0, A2=0.004, phi2=1.0, A3=0.002, phi3=2.0), 1e-3
     )

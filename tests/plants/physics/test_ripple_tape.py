@@ -1,4 +1,4 @@
-"""Wheels out of round: the way is the integral of the arm, and a turn takes no work."""
+"""Eccentric wheels: the path is the integral of the lever arm; a turn does no work."""
 
 import math
 
@@ -25,7 +25,7 @@ def capstan(**values: float) -> ripple_tape.WheelParams:
 
 @settings(deadline=None)
 @given(phases, phases, phases, st.floats(-50, 50))
-def test_the_arm_is_the_slope_of_the_way(phi, phi2, phi3, q):
+def test_lever_arm_is_the_derivative_of_the_path(phi, phi2, phi3, q):
     p = reel(e=1e-3, phi=phi, e2=3e-4, phi2=phi2, e3=-2e-4, phi3=phi3)
     d = 1e-5
     slope = (ripple_tape.way(p, q + d) - ripple_tape.way(p, q - d)) / (2 * d)
@@ -36,15 +36,15 @@ def test_the_arm_is_the_slope_of_the_way(phi, phi2, phi3, q):
     assert ripple_tape.way(p, q + 2 * math.pi) == pytest.approx(ripple_tape.way(p, q), abs=1e-12)
 
 
-def test_an_oval_capstan_is_off_by_what_the_thesis_says():
-    """Radii of 3 mm +- 2 um as one sine a turn: 4 um at most from where it starts (11.3, figure 11.2)."""
+def test_path_error_of_the_capstan_matches_the_thesis():
+    """Radius 3 mm +- 2 um as one sine per turn: path error at most 4 um (11.3, figure 11.2)."""
     p = capstan(a=2e-6, phi=-math.pi / 2)
     e = [ripple_tape.way(p, q) for q in np.linspace(0, 2 * math.pi, 361)]
     assert max(map(abs, e)) == pytest.approx(4e-6, rel=1e-4)
 
 
 def forces(act, node: int, q: np.ndarray, v: np.ndarray, damped: bool = False) -> tuple[np.ndarray, np.ndarray]:
-    """Forces on all nodes of the linear springs and the term at middles q, v (5,), and the pulls in both tapes."""
+    """Node forces (5,) of linear springs and term at the midpoint q, v (5,), and tensions (2,) of both tapes."""
     _, s = stand.plant("ivu", H, d_tape=0.0, **({} if damped else {"k1": 0.0, "k2": 0.0}))
     s.m.qm[:5], s.m.vm[:5] = q, v
     linear_part = np.zeros(5)
@@ -57,7 +57,7 @@ def forces(act, node: int, q: np.ndarray, v: np.ndarray, damped: bool = False) -
 
 
 def together(p: ripple_tape.WheelParams, way, arm):
-    """Its two lines as they act one after the other."""
+    """Function that applies the path line and the lever-arm line in sequence."""
 
     def both(m, i):
         way(p, m, i)
@@ -85,8 +85,8 @@ CASES = {
 
 
 @pytest.mark.parametrize("node", CASES)
-def test_forces_come_from_one_potential(node):
-    """The springs' energy at the true stretch: its slope by each angle is the force there, so a cycle takes no work."""
+def test_forces_of_an_eccentric_wheel_derive_from_a_potential(node):
+    """Each force is the negative gradient of the spring energy at the true stretch; a cycle does no work."""
     at, p, way, arm = CASES[node]
     both = together(p, way, arm)
 
@@ -111,8 +111,8 @@ def test_forces_come_from_one_potential(node):
 
 
 @pytest.mark.parametrize("node", CASES)
-def test_other_laws_of_the_tape_feel_what_a_wheel_stretches_it_by(node):
-    """Springs that stiffen beside it: the forces still come from one potential, with a fourth power in it."""
+def test_tape_stiffening_includes_the_stretch_of_an_eccentric_wheel(node):
+    """With a cubic spring the forces derive from a potential with a fourth power."""
     at, p, way, arm = CASES[node]
     c3, d = 3e7, 1e-5
 
@@ -140,7 +140,7 @@ def test_other_laws_of_the_tape_feel_what_a_wheel_stretches_it_by(node):
 
 
 @pytest.mark.parametrize("node", CASES)
-def test_the_damper_only_takes_energy(node):
+def test_tape_damper_at_an_eccentric_wheel_dissipates_energy(node):
     at, p, way, arm = CASES[node]
     both = together(p, way, arm)
 
@@ -152,7 +152,7 @@ def test_the_damper_only_takes_energy(node):
         assert (moving - still) @ v <= 1e-12
 
 
-def test_a_reel_off_centre_shows_once_a_turn_and_with_the_tension():
+def test_reel_eccentricity_is_visible_and_linear_in_its_size():
     u = np.tile([0.9, 0.3], (2500, 1))  # both pull, motor 1 winds
 
     def wave(volts: np.ndarray, e: float) -> np.ndarray:
@@ -161,11 +161,11 @@ def test_a_reel_off_centre_shows_once_a_turn_and_with_the_tension():
         return stand.run("ivu", [term], volts, **options).x - stand.run("ivu", [], volts, **options).x
 
     change = wave(u, 2e-4)
-    assert np.allclose(wave(u, 4e-4), 2 * change, atol=0.05 * np.abs(change).max())  # in proportion to e
+    assert np.allclose(wave(u, 4e-4), 2 * change, atol=0.05 * np.abs(change).max())  # proportional to e
     assert np.abs(change[:, ivu.CAPSTAN]).max() > 3 * 2 * np.pi / 10_000
 
 
-def test_ldu_shows_it_at_the_scale_alone():
+def test_capstan_eccentricity_of_the_linear_drive_changes_only_the_scale():
     u = stand.excitation("ldu", 300)
     one, two = stand.run("ldu", [], u), stand.run("ldu", [stand.make("ripple.capstan", "ldu", a=2e-6, phi=1.0)], u)
     assert np.array_equal(one.x, two.x) and np.array_equal(one.y[:, 0], two.y[:, 0])

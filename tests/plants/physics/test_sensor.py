@@ -1,4 +1,4 @@
-"""Sensors: jumps that stay, directions that are not told, and factors, whenever the reading is asked for."""
+"""Sensor errors: permanent jumps, rectified counting and scale factors, for any reading sequence."""
 
 import math
 
@@ -20,7 +20,7 @@ def missed(**values) -> tuple:
     return p, np.zeros(1, sensor.MISSED_COUNTS_STATE).view(np.recarray)[0]
 
 
-def test_jumps_stay():
+def test_missed_counts_remain():
     p, s = missed(at=1.0, size=-0.5, more=((2.0, -0.4), (3.0, -0.2)), over=0.1)
     off = {t: sensor.missed_counts(p, s, 0.0, t) for t in (0.0, 1.0, 1.05, 1.1, 1.9, 2.1, 9.0)}
     assert off == pytest.approx({0.0: 0.0, 1.0: 0.0, 1.05: -0.25, 1.1: -0.5, 1.9: -0.5, 2.1: -0.3, 9.0: -0.2})
@@ -33,23 +33,23 @@ def test_too_many_jumps_are_refused():
 
 
 @pytest.mark.parametrize(("way", "expected"), [("forward", 3 - 0), ("backward", 2)])
-def test_a_mark_counts_in_one_direction(way, expected):
+def test_index_mark_adds_an_error_in_one_direction(way, expected):
     p, s = missed(each=1.0, way=way, mark=1.0, turn=2.0)
     for x in [*np.arange(0, 6.5, 0.1), *np.arange(6.5, 1.5, -0.1)]:  # marks at 1, 3, 5; back over 5, 3
         sensor.pass_marks(p, s, x)
     assert sensor.missed_counts(p, s, 1.5, 0.0) == expected
-    assert sensor.missed_counts(p, s, 0.5, 0.0) == expected + (way == "backward")  # what has just been passed counts
+    assert sensor.missed_counts(p, s, 0.5, 0.0) == expected + (way == "backward")  # the mark just passed counts
 
 
 @settings(deadline=None)
 @given(st.floats(-3, 3), st.floats(0.1, 7), st.lists(st.floats(-20, 20), min_size=1, max_size=20))
-def test_marks_count_the_same_however_often_one_looks(mark, turn, path):
+def test_index_marks_do_not_depend_on_the_number_of_readings(mark, turn, path):
     p, s = missed(each=-0.1, mark=mark, turn=turn)
     _, t = missed()
     assert sensor.missed_counts(p, s, 0.0, 0.0) == 0.0
     for x in path:
         before = sensor.missed_counts(p, s, x, 0.0)
-        assert sensor.missed_counts(p, s, x, 0.0) == before  # a reading keeps no memory
+        assert sensor.missed_counts(p, s, x, 0.0) == before  # a reading does not change the state
         sensor.pass_marks(p, s, x)
         assert sensor.missed_counts(p, s, x, 0.0) == before
         assert before <= 0.0
@@ -58,7 +58,7 @@ def test_marks_count_the_same_however_often_one_looks(mark, turn, path):
 
 @settings(deadline=None)
 @given(st.lists(st.floats(-20, 20), min_size=1, max_size=20), st.floats(0, 1))
-def test_rectified_counts_up_in_either_direction(path, share):
+def test_rectified_sensor_counts_up_in_both_directions(path, share):
     p = sensor.build_rectified(sensor.RectifiedSettings(node="encoder", share=share), H)
     s, total, was = np.zeros(1, sensor.RECTIFIED_STATE).view(np.recarray)[0], 0.0, 0.0
     for x in path:
@@ -70,7 +70,7 @@ def test_rectified_counts_up_in_either_direction(path, share):
 
 
 @pytest.mark.parametrize(("share", "shown"), [(1.0, 2.0), (0.5, 0.0)])
-def test_of_a_speed_the_way_it_goes_is_lost_and_nothing_is_added_up(share, shown):
+def test_rectified_speed_sensor_loses_the_sign(share, shown):
     p = sensor.build_rectified(sensor.RectifiedSettings(node="counter", share=share), H)
     s = np.zeros(1, sensor.RECTIFIED_STATE).view(np.recarray)[0]
     sensor.go(s, 7.0)
@@ -78,7 +78,7 @@ def test_of_a_speed_the_way_it_goes_is_lost_and_nothing_is_added_up(share, shown
     assert 2.0 + sensor.rectified(p, s, 7.0, 2.0, 1) == 2.0
 
 
-def test_scale():
+def test_scale_factor_of_a_sensor():
     p = sensor.build_scale(sensor.ScaleSettings(node="encoder", relative=6e-4), H)
     assert sensor.scale(p, -2.0) == pytest.approx(-2.0012)
 
@@ -94,7 +94,7 @@ SIZES = {
 @pytest.mark.parametrize(("kind", "node", "channel"), [
     ("ivu", "encoder", 0), ("ldu", "encoder", 0), ("ldu", "scale", 1), ("axis", "sensor", 0),
 ])  # fmt: skip
-def test_a_sensor_is_off_alone_and_the_machine_is_not(name, kind, node, channel):
+def test_sensor_error_changes_only_its_channel(name, kind, node, channel):
     u = stand.excitation(kind, 400)
     one, two = stand.run(kind, [], u), stand.run(kind, [stand.make(name, kind, node, **SIZES[name])], u)
     assert np.array_equal(one.x, two.x)
@@ -105,7 +105,7 @@ def test_a_sensor_is_off_alone_and_the_machine_is_not(name, kind, node, channel)
 @pytest.mark.parametrize(
     ("kind", "node", "channel"), [("ivu", "encoder", 0), ("ldu", "scale", 1), ("axis", "sensor", 0)]
 )
-def test_a_rectified_sensor_adds_up_the_way_on_a_machine(kind, node, channel):
+def test_rectified_sensor_of_a_plant_accumulates_the_path(kind, node, channel):
     u = stand.excitation(kind, 800)
     r = stand.run(kind, [stand.make("sensor.rectified", kind, node, share=1.0)], u, substeps=8)
     y = stand.run(kind, [], u, substeps=8).y[:, channel]

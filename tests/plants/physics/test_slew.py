@@ -16,8 +16,8 @@ def output(u, **settings):
     return np.array(out)
 
 
-def test_a_rate_bends_towards_its_limit():
-    """y' = rate tanh((u - y) / (rate tau)), by another solver."""
+def test_smooth_slew_limit_matches_its_differential_equation():
+    """y' = rate tanh((u - y) / (rate tau)), integrated by scipy."""
     u = np.repeat([0.05, 2.0, -1.0], 60)
     y, expected = 0.0, []
     for value in u:
@@ -28,7 +28,7 @@ def test_a_rate_bends_towards_its_limit():
     assert output(u, rate=RATE, tau=TAU) == pytest.approx(np.array(expected), abs=1e-7)
 
 
-def test_small_steps_are_a_lag_and_large_ones_a_ramp():
+def test_small_steps_give_a_lag_and_large_steps_a_ramp():
     small = output(np.full(40, 1e-4), rate=RATE, tau=TAU)
     assert small == pytest.approx(1e-4 * (1.0 - np.exp(-np.arange(1, 41) * H / TAU)), rel=1e-5)
     large = output(np.full(40, 1e4), rate=RATE, tau=TAU)
@@ -36,6 +36,6 @@ def test_small_steps_are_a_lag_and_large_ones_a_ramp():
 
 
 @pytest.mark.parametrize("z", [0.0, 0.3, 5.0, 19.9, 20.1, 60.0])
-def test_what_is_ahead_shrinks_without_a_jump_between_forms(z):
+def test_slew_decay_is_continuous_across_its_numerical_branches(z):
     assert bent(z, 0.0) == pytest.approx(z, abs=1e-12)
     assert bent(z, 0.2) == pytest.approx(bent(bent(z, 0.1), 0.1), abs=1e-12)

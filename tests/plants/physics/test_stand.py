@@ -1,4 +1,4 @@
-"""What holds for every term on the stand: no effect at size zero, seen at its usual size, the same at half the step."""
+"""Properties of every term on the stand: no effect at size zero, visibility, step convergence, documentation."""
 
 import re
 from typing import Any
@@ -36,7 +36,7 @@ BY_KIND: dict[tuple[str, str], dict[str, Any]] = {
     ("ripple.encoder", "axis"): {"A": 2e-6, "turn": 0.02},
 }
 OPTIONS: dict[str, dict[str, Any]] = {"axis": {}, "ivu": {"d_tape": 0.0}, "ldu": {"substeps": 8}}
-PLACES = [(t.name, kind, node) for kind in stand.PLANTS for t in stand.of(kind) for node in nodes(t, kind)]
+PLACES = [(t.name, kind, node) for kind in stand.PLANTS for t in stand.terms_of(kind) for node in nodes(t, kind)]
 
 
 def usual(name: str, kind: str, node: str) -> Any:
@@ -44,7 +44,7 @@ def usual(name: str, kind: str, node: str) -> Any:
 
 
 @pytest.mark.parametrize(("name", "kind", "node"), PLACES)
-def test_size_zero_has_no_effect_and_the_usual_size_is_seen(name, kind, node):
+def test_size_zero_has_no_effect_and_typical_size_is_visible(name, kind, node):
     assert stand.seen(kind, [stand.make(name, kind, node)], **OPTIONS[kind]) == 0.0
     assert stand.seen(kind, [usual(name, kind, node)], **OPTIONS[kind]) > 1.0
 
@@ -53,7 +53,7 @@ HALVED = [(n, k, node) for n, k, node in PLACES if n != "timing.jitter"]
 
 
 @pytest.mark.parametrize(("name", "kind", "node"), HALVED)
-def test_half_the_step_gives_the_same_effect(name, kind, node):
+def test_effect_converges_with_the_step_size(name, kind, node):
     volts = stand.excitation(kind, 600)
     term = usual(name, kind, node)
     steps = OPTIONS[kind].get("substeps", 4)
@@ -66,7 +66,7 @@ def test_half_the_step_gives_the_same_effect(name, kind, node):
     assert np.abs(coarse - fine).max() < 0.1 * np.abs(fine).max() + 1e-9
 
 
-def test_every_term_is_explained():
+def test_every_term_of_the_stand_is_documented():
     for name, term in stand.TERMS.items():
         fields = term.settings.model_fields
         assert name == term.name == fields["term"].default
@@ -82,7 +82,7 @@ def test_every_term_is_explained():
         assert all(field.description for key, field in fields.items() if "json_schema_extra" in field.asdict())
 
 
-def test_look_alikes_of_this_half_name_each_other():
+def test_look_alikes_are_mutual():
     for name, term in stand.TERMS.items():
         for rival in term.look_alikes:
             if rival in stand.TERMS and set(by_kind(term)) & set(by_kind(stand.TERMS[rival])):
@@ -90,13 +90,13 @@ def test_look_alikes_of_this_half_name_each_other():
 
 
 @pytest.mark.parametrize("kind", stand.PLANTS)
-def test_no_run_takes_memory(kind, allocations):
+def test_term_allocates_no_memory(kind, allocations):
     function, slot, memory = stand.compiled(kind)
     p, s = stand.plant(kind, 5e-4)
     volts = stand.excitation(kind, 3)
     q, z = np.zeros(1, slot).view(np.recarray), np.zeros(1, memory).view(np.recarray)
     x, y = np.zeros((3, s.m.nx)), np.zeros((3, s.m.ny))
-    none = allocations(function, q, z, p, s, volts, 4, x, y)  # of the call itself
-    for number in range(1, len(stand.of(kind)) + 1):
+    none = allocations(function, q, z, p, s, volts, 4, x, y)  # allocations of the call
+    for number in range(1, len(stand.terms_of(kind)) + 1):
         q[0].number = number
         assert allocations(function, q, z, p, s, volts, 4, x, y) == none

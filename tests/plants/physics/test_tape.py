@@ -1,4 +1,4 @@
-"""Tape that relaxes, and tape that cannot push."""
+"""Viscoelastic tape and slack tape."""
 
 import bench
 import numpy as np
@@ -19,14 +19,14 @@ def state() -> np.recarray:
 
 @settings(deadline=None)
 @given(st.floats(1e-5, 100), st.floats(1e-5, 1e-2))
-def test_a_step_of_elongation_relaxes_by_its_time(tau, h):
+def test_elongation_step_relaxes_with_its_time_constant(tau, h):
     p, s = branches(h, c_branch=200.0, tau=tau), state()
     pulls = [tape.viscoelastic(p, s, 1e-3, 0.0) for _ in range(20)]
     mean = tau / h * (1 - np.exp(-h / tau))  # over a substep
     assert pulls == pytest.approx([0.2 * mean * np.exp(-k * h / tau) for k in range(20)], rel=1e-6, abs=1e-12)
 
 
-def test_slow_is_soft_and_fast_is_stiff():
+def test_viscoelastic_tape_is_soft_at_low_and_stiff_at_high_rates():
     pulls = {}
     for name, rate in (("fast", 1e-1), ("slow", 1e-5)):
         h = 1e-3 / rate / 1000
@@ -38,7 +38,7 @@ def test_slow_is_soft_and_fast_is_stiff():
 
 @settings(deadline=None, max_examples=50)
 @given(st.lists(st.floats(-1, 1), min_size=4, max_size=40), st.floats(1e-4, 10))
-def test_it_gives_back_no_more_than_it_took(rates, tau):
+def test_viscoelastic_tape_is_passive(rates, tau):
     h = 1e-3
     p, s, e, work = branches(h, c_branch=100.0, tau=tau), state(), 0.0, 0.0
     for rate in rates:
@@ -47,8 +47,8 @@ def test_it_gives_back_no_more_than_it_took(rates, tau):
         assert work >= -1e-12
 
 
-def test_a_slack_tape_does_not_push():
-    """Motor 1 pays out against a motor 2 that stands: the linear tape pushes, the real one hangs."""
+def test_slack_tape_transmits_no_pushing_force():
+    """Motor 1 pays out and motor 2 rests: a linear tape pushes reel 2, a slack tape does not."""
     inputs = np.concatenate([np.full((300, 2), 0.5), np.tile([-0.5, 0.0], (200, 1))])
     for share, pushes in ((0.0, True), (1.0, False)):
         terms = [bench.usual("tape.slack", "ivu", "tape1", share=share)]
@@ -59,8 +59,8 @@ def test_a_slack_tape_does_not_push():
         assert (reel2 > 3e-5) == pushes
 
 
-def test_the_other_side_of_the_tape_may_be_told_apart():
-    """Motor 1 pays out as above: tape 1 pushes the capstan back, unless both sides are slack."""
+def test_option_other_applies_slack_to_both_tapes():
+    """Motor 1 pays out: tape 1 pushes the capstan back unless both tapes can be slack."""
     inputs = np.concatenate([np.full((300, 2), 0.5), np.tile([-0.5, 0.0], (200, 1))])
     way = {}
     for other in (0.0, 1.0):
@@ -70,6 +70,6 @@ def test_the_other_side_of_the_tape_may_be_told_apart():
 
 
 @given(st.floats(-10, 10), st.floats(0, 1))
-def test_slack_takes_away_the_push_only(T, share):
+def test_slack_removes_only_compression(T, share):
     total = T + tape.slack(share, T)
     assert total == pytest.approx(T if T > 0 else (1 - share) * T)

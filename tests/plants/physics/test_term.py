@@ -1,4 +1,4 @@
-"""What every term of physics promises, on every plant and at every node where it can stand."""
+"""Properties of every term of the bench, on every plant and at every node of the term."""
 
 import re
 from functools import cache
@@ -23,24 +23,24 @@ UNDAMPED = {
 
 @cache
 def plain(kind: str, loose: bool, finer: int = 1) -> bench.Run:
-    """The machine without the term."""
+    """Run of the machine without the term."""
     return bench.run(kind, [], bench.moves(kind, loose=loose), substeps=finer * bench.SUBSTEPS[kind])
 
 
 def counts(kind: str, a: bench.Run, b: bench.Run) -> float:
-    """Largest difference of any sensor."""
+    """Largest difference of any sensor, counts."""
     return float(np.abs((a.y - b.y) / np.array(bench.COUNT[kind])).max())
 
 
 @pytest.mark.parametrize(("name", "kind", "node"), EVERYWHERE)
-def test_without_size_it_is_not_there(name, kind, node):
+def test_term_of_size_zero_has_no_effect(name, kind, node):
     loose = name == "tape.slack"
     with_it = bench.run(kind, [bench.nothing(name, kind, node)], bench.moves(kind, loose=loose))
     assert counts(kind, with_it, plain(kind, loose)) < 1e-3
 
 
 @pytest.mark.parametrize(("name", "kind", "node"), EVERYWHERE)
-def test_it_is_seen_in_a_recording_at_its_usual_size(name, kind, node):
+def test_term_of_typical_size_is_visible(name, kind, node):
     loose = name == "tape.slack"
     with_it = bench.run(kind, [bench.usual(name, kind, node)], bench.moves(kind, loose=loose))
     assert np.isfinite(with_it.y).all()
@@ -48,7 +48,7 @@ def test_it_is_seen_in_a_recording_at_its_usual_size(name, kind, node):
 
 
 @pytest.mark.parametrize(("name", "kind"), ONCE)
-def test_half_the_step_gives_the_same_motion(name, kind):
+def test_motion_converges_with_the_step_size(name, kind):
     loose, term = name == "tape.slack", bench.usual(name, kind)
     h, half, exact = (
         bench.run(kind, [term], bench.moves(kind, loose=loose), substeps=f * bench.SUBSTEPS[kind]) for f in (1, 2, 8)
@@ -59,7 +59,7 @@ def test_half_the_step_gives_the_same_motion(name, kind):
 
 
 @pytest.mark.parametrize(("name", "kind", "node"), EVERYWHERE)
-def test_a_passive_term_never_makes_a_machine_faster_than_it_was_pushed(name, kind, node):
+def test_passive_term_never_increases_the_kinetic_energy(name, kind, node):
     if not bench.TERMS[name].passive:
         pytest.skip("it feeds energy in by its nature")
     speeds = {
@@ -81,7 +81,7 @@ def test_a_passive_term_never_makes_a_machine_faster_than_it_was_pushed(name, ki
     assert bench.kinetic(r.s, r.v).max() < bench.kinetic(r.s, v)[0] * 1.002
 
 
-def test_no_term_allocates(allocations):
+def test_term_allocates_no_memory(allocations):
     kind, loop = "ivu", bench.moves("ivu", 0.01)
     function, params, states = bench.compiled(kind)
     p, s = bench.plant(kind, 5e-4)
@@ -92,12 +92,12 @@ def test_no_term_allocates(allocations):
         slots[n] = (n + 1, spot.node, spot.link, spot.channel, 1.0)
         bench.fill_record(ps[n][term.name.replace(".", "_")], term.build(bench.usual(term.name, kind), 5e-4))
     out: tuple[Any, ...] = (np.zeros((10, 5)), np.zeros((10, 5)), np.zeros((10, 3)), np.zeros(10))
-    without = allocations(function, slots[:0], ps, ss, p, s, loop, 2, *out)  # for the call itself
+    without = allocations(function, slots[:0], ps, ss, p, s, loop, 2, *out)  # allocations of the call
     assert allocations(function, slots, ps, ss, p, s, loop, 2, *out) == without
 
 
 @pytest.mark.parametrize("name", bench.TERMS)
-def test_it_is_explained_to_a_mechanic(name):
+def test_every_term_is_documented_for_the_mechanic(name):
     term = bench.TERMS[name]
     assert name == term.name == term.settings.model_fields["term"].default
     assert len(term.words) > 20 and len(term.equation) > 4 and len(term.source) > 4

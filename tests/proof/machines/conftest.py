@@ -1,4 +1,4 @@
-"""Small machines of the proof: short setups of every topology, and hand-made descriptions for analytic checks."""
+"""Small machines of the proof: short setups of every topology and descriptions for analytic checks."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ def shorten(s, seconds, settle=0.5):
 
 @pytest.fixture(scope="session")
 def machines():
-    """One short sound machine of each topology whose loop holds, with its run."""
+    """One nominal machine of each topology with a stable loop, with its run."""
     out = {}
     for k, name in enumerate(TOPOLOGIES):
         for again in range(8):

@@ -1,4 +1,4 @@
-"""Concealed cases of described machines: determinism, the format, shares of kinds, effects that show, scores."""
+"""Concealed cases of described machines: determinism, format, shares of the kinds, visible effects, scores."""
 
 import importlib.util
 import json
@@ -19,13 +19,13 @@ from rtctl.proof.machines.unknown import UNKNOWN
 from rtctl.proof.score import score
 
 SHARED = Path(__file__).parents[4] / "shared" / "machines"
-NAMES = 38  # of the tables in the exchange format that such machines may have
+NAMES = 38  # effects in the tables of the exchange format that a described machine may have
 NEED_MORE = ("structure.compliance", "sensor.rectified", "sensor.scale")  # a rigid joint, a second reading
 
 
 @pytest.fixture(scope="module")
 def measured(machines):
-    """Sound machines with their trajectories, run and noise floors."""
+    """Nominal machines with their runs and noise floors."""
     out = {}
     for name, (s, run) in machines.items():
         measure(s, run)
@@ -34,7 +34,7 @@ def measured(machines):
 
 
 @pytest.mark.parametrize("name", sorted({*TABLE, *UNKNOWN} - {*NEED_MORE}))
-def test_an_effect_shows_on_some_machine(measured, name):
+def test_effect_is_visible_on_at_least_one_machine(measured, name):
     p = draw.Plan("single", 1.0, (name,), (), "rich", None)
     best = 0.0
     for base, run, floor in measured.values():
@@ -53,7 +53,7 @@ def test_an_effect_shows_on_some_machine(measured, name):
 
 
 @pytest.mark.parametrize("name", NEED_MORE)
-def test_effects_that_need_a_special_machine_show(name):
+def test_effect_that_needs_a_special_machine_is_visible(name):
     p = draw.Plan("single", 1.0, (name,), ("belt",), "rich", None)
     need = draw.needs(p)
     for seed in range(8):
@@ -72,7 +72,7 @@ def test_effects_that_need_a_special_machine_show(name):
     raise AssertionError("no belt whose loop holds")
 
 
-def test_an_effect_leaves_the_sound_machine_alone(measured):
+def test_adding_an_effect_does_not_change_the_nominal_machine(measured):
     base, run, _ = measured["belt"]
     before = base.m.copy()
     g.put(base, draw.Plan("single", 1.0, ("structure.resonance",), (), "rich", None), [7], 1.0)
@@ -81,7 +81,7 @@ def test_an_effect_leaves_the_sound_machine_alone(measured):
     assert np.array_equal(sim.simulate(base, [1])[column], run[column])
 
 
-def test_kinds_come_in_their_shares_and_names_in_turn():
+def test_plans_have_their_shares_of_kinds_and_cover_all_effects():
     plans = [draw.plan(5, i) for i in range(120)]
     assert Counter(p.kind for p in plans) == {
         "single": 54, "null": 14, "parameters": 10, "decoy": 6, "pair": 18, "unknown": 18,
@@ -93,7 +93,7 @@ def test_kinds_come_in_their_shares_and_names_in_turn():
     assert draw.plan(5, 17) == draw.plan(5, 17) != draw.plan(6, 17)
 
 
-def test_the_owner_believes_within_the_tolerances():
+def test_nominal_values_are_within_the_tolerances_of_the_true_values():
     s = build.sound("arm", np.random.default_rng(4), "rich", frozenset(), True)
     tolerance = s.case["tolerance"]
     owner = dict(describe.numbers(s.case["machine"]))
@@ -101,7 +101,7 @@ def test_the_owner_believes_within_the_tolerances():
         share = tolerance.get(path, tolerance["default"] if not path.endswith(("dac_bits", "dac_range")) else 0.0)
         assert abs(true - owner[path]) <= share * abs(owner[path]) * 1.001, path
     wrong = [abs(s.truth[p] / owner[p] - 1.0) / tolerance.get(p, tolerance["default"]) for p in s.truth]
-    assert min(wrong) > 0.75  # all at the edge of what they may be wrong by
+    assert min(wrong) > 0.75  # every parameter error is near its tolerance
 
 
 @pytest.fixture(scope="module")
@@ -112,7 +112,7 @@ def written(tmp_path_factory):
     return folder, kinds
 
 
-def test_bundles_are_in_format_2(written):
+def test_bundles_have_format_2(written):
     folder, kinds = written
     answers = seal.open_seal(folder)
     assert answers["format"] == 2 and answers["mix"] == "proof of machines, seed 292"
@@ -131,7 +131,7 @@ def test_bundles_are_in_format_2(written):
                 assert table[part["column"]].type == "int32"
 
 
-def test_the_same_seed_gives_the_same_bytes(written, tmp_path):
+def test_equal_seeds_give_identical_bytes(written, tmp_path):
     folder, _ = written
     g.write_case(tmp_path, 292, 1, ("spindle", "axis"), False)
     again = json.loads((tmp_path / g.DRAFT / "case-0002.json").read_text())
@@ -140,7 +140,7 @@ def test_the_same_seed_gives_the_same_bytes(written, tmp_path):
         assert (tmp_path / "case-0002" / file).read_bytes() == (folder / "case-0002" / file).read_bytes()
 
 
-def test_wrong_requests_are_refused(written, tmp_path):
+def test_invalid_requests_are_refused(written, tmp_path):
     with pytest.raises(UserError, match="holds cases"):
         g.generate(written[0], 1, 1)
     with pytest.raises(UserError, match="not one of"):
@@ -150,7 +150,7 @@ def test_wrong_requests_are_refused(written, tmp_path):
 
 
 def oracle(a, twin=False):
-    """A diagnosis that knows the answer; with `twin` by another name of the same physics."""
+    """The correct diagnosis; with `twin` under an equivalent name of the effect."""
     if a["kind"] == "unknown":
         return {"verdict": "unnamed", "effects": [], "located": {"node": a["effects"][0]["node"], "axis": "time"}}
     if not a["effects"]:
@@ -161,7 +161,7 @@ def oracle(a, twin=False):
 
 
 def answers_of_all_kinds():
-    """Answers as the generator writes them, without simulating; gravity and an offset are twins."""
+    """Answers in the format of the generator, without simulation; gravity and offset are equivalent names."""
     twins = {"load.gravity", "drive.offset"}
     held = {"single": ["load.gravity"], "pair": ["drive.offset", "friction.stribeck"], "unknown": ["unknown.x"]}
     cases = {}
@@ -184,7 +184,7 @@ def answers_of_all_kinds():
 
 
 @pytest.mark.parametrize("twin", [False, True])
-def test_an_oracle_and_an_exact_twin_score_in_full(twin):
+def test_correct_names_and_equivalent_names_get_the_full_score(twin):
     cases = answers_of_all_kinds()
     R = score(cases, {c: oracle(a, twin) for c, a in cases.items()})
     assert (R["single"]["top1"], R["node_accuracy"], R["named_precision"], R["pair"]["all_found"]) == (1, 1, 1, 1)
@@ -193,7 +193,7 @@ def test_an_oracle_and_an_exact_twin_score_in_full(twin):
     assert sum(x["cases"] for x in R["by_plant"].values()) == len(cases)
 
 
-def test_a_gust_may_be_noticed_and_not_named():
+def test_unnamed_force_is_a_correct_answer_for_a_decoy():
     cases = {c: a for c, a in answers_of_all_kinds().items() if a["kind"] in ("decoy", "null")}
     R = score(cases, {c: {"verdict": "unnamed", "effects": []} for c in cases})
     assert R["null"]["by_kind"]["decoy"] == [0, 3] and R["null"]["by_kind"]["null"] == [7, 7]
@@ -201,7 +201,7 @@ def test_a_gust_may_be_noticed_and_not_named():
 
 @pytest.mark.skipif(not (SHARED / "score.py").exists(), reason="no practice cases here")
 @pytest.mark.parametrize("seed", [1, 2])
-def test_agrees_with_the_scorer_of_the_practice_cases(seed):
+def test_scores_agree_with_the_scorer_of_the_practice_cases(seed):
     spec = importlib.util.spec_from_file_location("machines_score", SHARED / "score.py")
     theirs = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(theirs)

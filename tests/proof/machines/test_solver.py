@@ -1,4 +1,4 @@
-"""Equations of the described machines against closed forms, and the error of the step."""
+"""Equations of motion of described machines against closed forms, and the integration error."""
 
 import math
 
@@ -12,12 +12,12 @@ WEIGHT = 9.81
 
 
 def crossings(x):
-    """Times (ticks) at which x goes up through zero, interpolated."""
+    """Times (ticks) of the upward zero crossings of x, interpolated."""
     k = np.flatnonzero((x[:-1] < 0.0) & (x[1:] >= 0.0))
     return k - x[k] / (x[k + 1] - x[k])
 
 
-def test_pendulum_swings_with_its_period_and_keeps_its_energy(free):
+def test_pendulum_has_its_period_and_conserves_energy(free):
     mass, arm, inertia = 0.7, 0.2, 0.04
     body = {"inertia": inertia, "gravity": {"mass": mass, "arm": arm, "angle": 0.0}}
     states = free({"bodies": {"pendulum": body}}, 0.0, [0.05], 6000)
@@ -28,7 +28,7 @@ def test_pendulum_swings_with_its_period_and_keeps_its_energy(free):
     assert np.ptp(energy) < 1e-9 * mass * WEIGHT * arm
 
 
-def test_belt_mode_has_its_frequency(free):
+def test_belt_mode_frequency_matches_the_closed_form(free):
     J, m, n, k = 4e-5, 1.5, 0.0127, 8e4
     machine = {
         "bodies": {"motor": {"inertia": J}, "carriage": {"mass": m}},
@@ -44,7 +44,7 @@ def test_belt_mode_has_its_frequency(free):
 
 
 @pytest.mark.parametrize("inductance", [None, 4e-4])
-def test_voltage_motor_reaches_its_terminal_speed(free, inductance):
+def test_terminal_speed_of_a_voltage_driven_motor(free, inductance):
     K, R, B, F, V = 0.06, 1.1, 2e-5, 0.008, 12.0
     drive = {"body": "rotor", "column": "u", "kind": "voltage", "gain": 2.0, "limit": 12.0, "resistance": R,
              "torque_constant": K} | ({"inductance": inductance} if inductance else {})  # fmt: skip
@@ -53,7 +53,7 @@ def test_voltage_motor_reaches_its_terminal_speed(free, inductance):
     assert v[-1] == pytest.approx((K * V / R - F) / (K * K / R + B), rel=1e-5)
 
 
-def test_rigid_joints_move_as_one_and_carry_the_load(free):
+def test_rigid_joint_couples_the_bodies_and_carries_the_load(free):
     n, mass, J = 0.05, 4.0, 0.01
     machine = {
         "bodies": {"drum": {"inertia": J}, "load": {"mass": mass, "gravity": {"incline": math.pi / 2}}},
@@ -65,7 +65,7 @@ def test_rigid_joints_move_as_one_and_carry_the_load(free):
     assert states[-1, 1] == pytest.approx(n * fall, rel=1e-9)
 
 
-def test_dry_friction_holds_below_its_level_and_lets_go_above(free):
+def test_dry_friction_holds_below_its_level_and_slips_above(free):
     drive = {"body": "slide", "column": "u", "kind": "force", "gain": 1.0, "limit": 10.0}
     machine = {"bodies": {"slide": {"mass": 2.0, "dry": 3.0}}, "drives": {"amplifier": drive}}
     held = free(machine, 2.9, [], 2000)
@@ -74,8 +74,8 @@ def test_dry_friction_holds_below_its_level_and_lets_go_above(free):
     assert free(machine, 4.0, [], 1001)[-1, NB] == pytest.approx(0.5 * 0.999, rel=1e-3)  # one tick of delay
 
 
-def test_hysteresis_loses_energy_at_any_speed(free):
-    """A joint between a body and a heavy one rings down, and stands with the energy gone."""
+def test_hysteresis_dissipates_energy(free):
+    """A joint between a body and a heavy body rings down with hysteresis and keeps ringing without."""
 
     def losing(m):
         m["j_H"][0], m["j_z0"][0] = 2.0, 0.01
@@ -89,7 +89,7 @@ def test_hysteresis_loses_energy_at_any_speed(free):
     assert np.abs(lost[-200:, 0]).max() < 0.03
 
 
-def test_half_the_step_changes_no_reading_by_a_tenth_of_a_count(machines):
+def test_halving_the_step_changes_every_reading_by_less_than_a_tenth_of_a_count(machines):
     for name, (s, run) in machines.items():
         played = np.zeros((s.n, 2))
         for d, column in enumerate(s.commands):
@@ -108,7 +108,7 @@ def test_half_the_step_changes_no_reading_by_a_tenth_of_a_count(machines):
         assert np.abs(exact[0] - exact[1]).max() < 0.1, name
 
 
-def test_every_topology_follows_its_reference(machines):
+def test_every_topology_has_a_machine_that_moves(machines):
     from rtctl.proof.machines import TOPOLOGIES
 
     assert set(machines) == set(TOPOLOGIES)
