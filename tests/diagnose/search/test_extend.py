@@ -19,7 +19,7 @@ def test_most_promising_effect_is_fitted_beside_a_model():
     merit = found.merit
     known = {}
     fits = extended(found.like, [found.base], known, 2, merit, None)
-    assert known[key(fits[0].names)] is fits[0] or set(known) >= {key(f.names) for f in fits}
+    assert all(known[key(f.names)] is f for f in fits)
     assert max(fits, key=merit).names == ("friction.coulomb:carriage",)
 
 

@@ -5,12 +5,7 @@ import pytest
 from rtctl.plants.physics import TERMS
 from rtctl.plants.physics.search import At, Turn
 
-JUMPS = [(0.3, 1e-3), (0.7, 5e-4)]
 SEARCH = {name: term.search for name, term in TERMS.items() if term.search and any(s.offered for s in term.stands)}
-HINTS = {
-    "order": [2.0, 7.0], "wavelength": [0.01, 0.08], "spot": [0.3], "grip:capstan": [0.02, 0.03], "grip:wheel": [0.001],
-    "jump:encoder": JUMPS, "jump:scale": JUMPS, "jump:sensor": JUMPS,
-}  # fmt: skip
 
 
 def names(parts):

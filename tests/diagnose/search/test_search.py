@@ -14,10 +14,6 @@ def test_two_effects_are_found_together():
     assert pairs[frozenset(("friction.coulomb:carriage", "drive.offset:amplifier"))] > found.merit(found.best) - 2.0
 
 
-def test_model_error_of_one_effect_is_not_a_second_effect():
-    assert named().found.best.names == ("friction.coulomb:carriage",)
-
-
 def test_equivalent_models_are_extended_once():
     found = named().found
     best, base = found.best, found.base

@@ -3,7 +3,6 @@
 from rtctl.plants.physics import TERMS
 
 EXTRAS = {name for name, term in TERMS.items() if term.richer}
-HINTS = {"order": [7.0], "wavelength": [0.02]}
 
 
 def test_terms_with_richer_forms_are_searched():
