@@ -56,7 +56,7 @@ def test_card_that_fails_during_a_run_is_zeroed_and_reported(running, library, t
             line = run.stderr.readline()
             assert line, heard
             heard += line
-        told = r"/dev/comedi0 \(at-mio-16de-10\): reading input [01]: Input/output error"  # the failing channel depends on timing
+        told = r"/dev/comedi0 \(at-mio-16de-10\): reading input [01]: Input/output error"  # channel: chance
         assert re.search(told, heard)
         run.send_signal(signal.SIGINT)
         assert run.wait(60) in (0, 130)
