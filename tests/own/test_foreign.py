@@ -16,7 +16,7 @@ from rtctl.own.model import without_code
 from rtctl.trace.bundle import load_case, save_case
 
 
-def test_text_of_a_config_without_its_file_is_not_run(tmp_path: Path) -> None:
+def test_text_of_a_user_file_runs_only_if_the_file_is_named(tmp_path: Path) -> None:
     marker = tmp_path / "ran"
     source = files.Source("./law.py", "Law", f"open({str(marker)!r}, 'w').close()\n")
     with pytest.raises(files.ForeignError, match="--own"):

@@ -124,7 +124,9 @@ def test_resume_of_another_soak_is_refused(settings: Any, config: Callable[..., 
 
 
 @pytest.mark.usefixtures("runtime")
-def test_soak_on_a_running_daemon_has_the_events_of_the_seed(config: Callable[..., Any], tmp_path: Path) -> None:
+def test_soak_of_separate_processes_has_no_violations_and_cannot_be_resumed(
+    config: Callable[..., Any], tmp_path: Path
+) -> None:
     if not os.access("/dev/shm", os.W_OK):
         pytest.skip("/dev/shm cannot be written: loop and supervisor share memory there")
     live = config("ivu", mode="lockstep", link="shm")
