@@ -1,4 +1,4 @@
-"""What nearly every process of the tests runs, compiled once and in one process, where steps are shared.
+"""Compilation of the entry points that nearly every test process runs, once and in one process.
 
 The reel unit in its five ways to run has ten entry points. A process that starts alone compiles its own with all steps
 beneath, 10 to 20 s each; all of them in one process take less than half of that.
@@ -17,7 +17,7 @@ WAYS = (("fused", "shm"), ("lockstep", "shm"), ("lockstep", "zmq"), ("real", "sh
 
 
 def reel_unit() -> None:
-    """Compile it for the processes that are to come. Returns at once where another worker is at it, or all is there."""
+    """Compile the reel unit for later processes. Returns at once if another worker compiles it or the cache is full."""
     with _alone() as alone:
         for mode, link in WAYS if alone else ():
             _compile(machines.build(with_loop(load_config("ivu", []), mode, link)), link)

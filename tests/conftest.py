@@ -1,4 +1,4 @@
-"""What tests of a running machine share: small configs, a folder for sockets, and a machine inside the test process."""
+"""Shared fixtures: small configs, a folder for sockets, and a machine inside the test process."""
 
 import itertools
 import os
@@ -34,14 +34,14 @@ CONFIGS = Path(__file__).parents[1] / "configs"
 SHARED = TESTS.parents[1] / "shared"  # recordings from outside the project
 KEPT = Path(__file__).parents[1] / "build" / "tests"  # home and caches of every process that the tests start
 number = itertools.count(1)
-settings.register_profile("any machine", deadline=None)  # no test is wrong because it was slow
+settings.register_profile("any machine", deadline=None)  # no deadline: slow examples are not failures
 settings.load_profile("any machine")
 
 
 def at_home(environment: MutableMapping[str, str]) -> None:
     """Home and caches within the project, so that the tests neither write outside of it nor depend on the account that
     runs them. A cache that the caller names stays."""
-    environment.setdefault("PYTHONUSERBASE", site.getuserbase())  # where `pip install --user` has put the libraries
+    environment.setdefault("PYTHONUSERBASE", site.getuserbase())  # libraries of `pip install --user`
     for name in ("XDG_CONFIG_HOME", "XDG_CACHE_HOME", "XDG_DATA_HOME", "XDG_STATE_HOME", "HOME"):
         environment.pop(name, None)
     environment["HOME"] = str(KEPT)
@@ -66,7 +66,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> Iterator[None]:
 
 
 def group(item: pytest.Item) -> str:
-    """The group of a test, "" for none."""
+    """Worker group of a test, "" for none."""
     fixtures = getattr(item, "_fixtureinfo").name2fixturedefs.values()  # noqa: B009
     if item.get_closest_marker("realtime"):
         return "realtime"
@@ -81,13 +81,13 @@ def group(item: pytest.Item) -> str:
 
 
 def is_helper(module: ModuleType) -> bool:
-    """Whether it is one of the tests' own modules that keep what they made."""
+    """Whether a module is a test helper that caches its results."""
     path = getattr(module, "__file__", None)
     return path is not None and TESTS in Path(path).parents and any(keeps(value) for value in vars(module).values())
 
 
 def keeps(value: Any) -> bool:
-    """Whether it is a function that keeps what it once made."""
+    """Whether an object is a function with a cache."""
     return hasattr(value, "cache_info")
 
 
@@ -111,19 +111,19 @@ def nothing_is_written_elsewhere() -> Iterator[None]:
 
 @pytest.fixture(scope="session", autouse=True)
 def every_recording_replays(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Whatever the tests have recorded comes out of its own law once more, to the bit."""
+    """Every recording of the tests replays bit-exact."""
     yield
     for journal in sorted(tmp_path_factory.getbasetemp().rglob("orders.jsonl")):
         try:
             found = replay(journal.parent)
         except (UserError, NoAnswer):
-            continue  # cut short, damaged or changed on purpose
+            continue  # truncated, damaged or changed on purpose
         assert found.identical, f"{journal.parent}: {found.differences[0]}"
 
 
 @pytest.fixture(scope="session")
 def runtime() -> Iterator[Path]:
-    """A folder of our own for sockets and locks, with a short path: a socket's has 107 bytes at most."""
+    """A folder for sockets and locks with a short path: a socket path has at most 107 bytes."""
     if "PYTEST_XDIST_WORKER" in os.environ:  # many tests are coming; for one of them it would be too much
         from compiled import reel_unit
 
@@ -132,7 +132,7 @@ def runtime() -> Iterator[Path]:
     memory = Path(tempfile.mkdtemp(prefix="rt-", dir="/dev/shm" if os.access("/dev/shm", os.W_OK) else "/tmp"))
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_RUNTIME_DIR", str(folder))
-        patch.setenv("RTCTL_SHM_DIR", str(memory))  # segments of killed daemons would stay otherwise
+        patch.setenv("RTCTL_SHM_DIR", str(memory))  # otherwise segments of killed daemons remain
         yield folder
     for made in (folder, memory):
         shutil.rmtree(made, ignore_errors=True)
@@ -170,11 +170,11 @@ class Bench:
         self.ticks = 0
 
     def take_over(self, config: Any) -> None:
-        """Put the parameters of a config into the mailbox; they are taken with the next request."""
+        """Put the parameters of a config into the mailbox; the tick takes them with the next request."""
         generate.fill(self.segment["mailbox"][0]["params"], machines.build(config).diagram.blocks)
 
     def ask(self, *requests: str, **fields: int) -> "Bench":
-        """Count up each of the requests (arm, play, reset, disarm, gains) and set fields of the command."""
+        """Increment the given requests (arm, play, reset, disarm, gains) and set fields of the command."""
 
         def write(_: Any, command: Any) -> None:
             for name in requests:
@@ -224,7 +224,7 @@ def served(runtime: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[
 
 @pytest.fixture
 def library() -> Iterator[None]:
-    """The library of terms as it was: an own term stays in it for as long as a process lives."""
+    """Restores the library of terms: a user term stays registered for the life of the process."""
     from rtctl.own.term import registered
     from rtctl.plants.physics import TERMS
 

@@ -1,4 +1,4 @@
-"""Machines with mechanics from a file, for tests: the shipped ones, with what a test changes."""
+"""Shipped machines with mechanics from a file, with changes by a test."""
 
 from pathlib import Path
 from typing import Any
@@ -39,7 +39,7 @@ def params(machine: Description, h: float) -> Any:
 
 
 def functions(p: Any) -> Any:
-    """M (n, n) and h (n,) of a machine's file at q, v, interpreted."""
+    """M (n, n) and h (n,) of a mechanics file at q, v, interpreted."""
     code, c = type(p).code, p.coupled
 
     def of(q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -1,4 +1,4 @@
-"""Recordings of small machines by explicit integration, apart from the simulation of the fits."""
+"""Recordings of small machines by explicit integration, independent of the fit simulation."""
 
 from pathlib import Path
 
@@ -7,7 +7,7 @@ import numpy as np
 from rtctl.case.format2 import read_case
 from rtctl.diagnose.model.recording import record_of
 
-FINER = 20  # steps of the integration a row
+FINER = 20  # integration steps per row
 ROTOR = {
     "bodies": {"rotor": {"inertia": 1e-3, "viscous": 5e-4}},
     "drives": {"motor": {"body": "rotor", "column": "tau", "kind": "force", "unit": "Nm"}},
@@ -55,7 +55,7 @@ def moved(u, rate, inertia, force, dry=0.0, x=0.0, v=0.0, finer=FINER):
 
 
 def torque(sign, seed, rate=500.0, seconds=3.0):
-    """Levels (n,) of one sign, every fourth of them zero, so that the rotor never turns back."""
+    """Levels (n,) of one sign, every fourth zero; the rotor never reverses."""
     n = round(rate * seconds)
     levels = np.random.default_rng(seed).uniform(0.06, 0.12, n // 100 + 1)
     levels[3::4] = 0.0
@@ -63,7 +63,7 @@ def torque(sign, seed, rate=500.0, seconds=3.0):
 
 
 def rotor(sign, seed, dry=0.03, rate=500.0, **more):
-    """A rotor that turns one way."""
+    """A rotor with rotation in one direction."""
     u = torque(sign, seed, rate)
     x = moved(u, rate, 1e-3, lambda x, v: -5e-4 * v, dry)
     name = "left" if sign > 0 else "right"
@@ -71,5 +71,5 @@ def rotor(sign, seed, dry=0.03, rate=500.0, **more):
 
 
 def rounded(x, step):
-    """Values in whole steps."""
+    """Values rounded to steps."""
     return step * np.round(x / step)

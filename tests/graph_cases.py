@@ -1,4 +1,4 @@
-"""Recordings of described machines, made in memory by the simulation of the fits."""
+"""Recordings of described machines, made in memory by the fit simulation."""
 
 import json
 from functools import cache
@@ -52,7 +52,7 @@ def command(amplitude, seconds=SECONDS, seed=1):
 
 
 def blank(case, u):
-    """A record of a case with a command (n,) and sensors that show nothing yet."""
+    """A record of a case with a command (n,) and empty sensor columns."""
     n, rate = len(u), case["sample_rate"]
     read = read_case(case, "bundle")
     sensors = read.machine.sensors
@@ -92,19 +92,19 @@ def write_bundle(folder, case, columns):
 
 @cache
 def nothing():
-    """Diagnosis of a pendulum that is as described."""
+    """Diagnosis of a nominal pendulum."""
     return diagnose_record(record(case_of(PENDULUM), command(4.0)))
 
 
 @cache
 def named():
-    """Diagnosis of a belt axis whose carriage rubs."""
+    """Diagnosis of a belt axis with friction at the carriage."""
     return diagnose_record(record(case_of(BELT), command(0.6), [RUB]))
 
 
 @cache
 def unnamed():
-    """Diagnosis of a pendulum that something pushes now and then."""
+    """Diagnosis of a pendulum with intermittent external pushes."""
     u = command(4.0)
     now_and_then = np.sin(2 * np.pi * 1.1 * np.arange(len(u)) / RATE) > 0.8
     return diagnose_record(record(case_of(PENDULUM), u, push=0.2 * now_and_then))
@@ -112,7 +112,7 @@ def unnamed():
 
 @cache
 def misread():
-    """Diagnosis of a pendulum whose command leaks into the reading of its encoder."""
+    """Diagnosis of a pendulum with crosstalk from the command to the encoder."""
     u = command(4.0)
     columns = columns_of(case_of(PENDULUM), u)
     acted = np.concatenate([[0.0, 0.0], u[:-2]])  # until the sensor is read: written two ticks before

@@ -1,4 +1,4 @@
-"""Cases of exchange format 1 as json has them."""
+"""Cases of exchange format 1 as JSON data."""
 
 import copy
 from typing import Any
@@ -39,7 +39,7 @@ AXIS = {
     "controller_known": True,
     "reaches": {"parameter_tolerance": 0.15},
 }
-WRITTEN = {"ivu": IVU, "ldu": LDU, "axis": AXIS}  # cases as json has them
+WRITTEN = {"ivu": IVU, "ldu": LDU, "axis": AXIS}  # cases as JSON data
 
 
 def case_of(kind: str, **changes: Any) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Records of exchange format 1 that a simulation makes."""
+"""Simulated records of exchange format 1."""
 
 import numpy as np
 
@@ -20,7 +20,7 @@ SENSORS = {
 
 
 def at_rest(case: Case, n: int, ref: np.ndarray | None = None, u: np.ndarray | None = None, sensors=()) -> Record:
-    """A record of n rows whose sensors stand still, with a reference (n,) and commands u (n, drives)."""
+    """A record of n rows with constant sensors, a reference (n,) and commands u (n, drives)."""
     dt, zero = 1.0 / float(case.sample_rate or 1.0), np.zeros(n)
     volts = np.zeros((n, len(commands_of(case.plant)))) if u is None else u
     y = dict.fromkeys(sensors or SENSORS[case.plant], zero)
@@ -44,7 +44,7 @@ def closed(record: Record, model: Model) -> tuple[dict[str, np.ndarray], np.ndar
 
 
 def of_closed(record: Record, model: Model) -> Record:
-    """The record of what `closed` gives."""
+    """Record of the result of `closed`."""
     y, volts = closed(record, model)
     return record._replace(y=y, u=volts)
 

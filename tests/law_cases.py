@@ -1,4 +1,4 @@
-"""The emulated belt axis under its PD law, as a bundle of format 2 whose case says that law."""
+"""Emulated belt axis under its PD law, as a bundle of format 2 with the law in its case."""
 
 from functools import cache
 from pathlib import Path
@@ -23,7 +23,7 @@ def belt():
 
 
 def law(**changes):
-    """The law of the belt axis as its owner says it."""
+    """Law of the belt axis as in a case."""
     position = belt()[0].law.position
     return {
         "kind": "pd", "P": position.gain, "D": position.gain * position.tau_d,

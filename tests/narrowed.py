@@ -1,4 +1,4 @@
-"""A search that asks about a few terms only: the whole library takes a minute or two."""
+"""Diagnosis restricted to a few terms; the whole library takes one to two minutes."""
 
 import pytest
 
@@ -6,6 +6,6 @@ from rtctl.diagnose.search import extend
 
 
 def only(patch: pytest.MonkeyPatch, *terms: str) -> None:
-    """Ask about these terms alone, as long as the patch lasts."""
+    """Restrict the library to the given terms while the patch is active."""
     every = extend.hypotheses
     patch.setattr(extend, "hypotheses", lambda *given: [h for h in every(*given) if h.term in terms])

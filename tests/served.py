@@ -1,4 +1,4 @@
-"""A machine inside the test process that answers the command socket as a daemon does, and moves when a test says so."""
+"""A machine inside the test process that answers the command socket like a daemon and moves on request."""
 
 import threading
 from types import SimpleNamespace
@@ -15,7 +15,7 @@ from rtctl.daemon.watched import Watched
 
 
 class Served(Answers):
-    """As much of a supervisor as commands and viewers see, around a Bench. Real commands, real refusals, no clock."""
+    """Supervisor around a Bench, as seen by commands and viewers: real commands and refusals, no clock."""
 
     def __init__(self, bench: Any, endpoint: str):
         self.bench, self.endpoint = bench, endpoint
@@ -46,14 +46,14 @@ class Served(Answers):
         return rows
 
     def start(self) -> None:
-        """Listen, as a daemon that has been started."""
+        """Listen, like a started daemon."""
         self.server = CommandServer(self.endpoint, Commands(self), self._context)  # type: ignore[arg-type]
         self._done = threading.Event()
         self._thread = threading.Thread(target=self._answer)
         self._thread.start()
 
     def stop(self) -> None:
-        """End listening, as a daemon that has ended."""
+        """Stop listening, like an ended daemon."""
         if self._thread is not None:
             self._done.set()
             self._thread.join()

@@ -1,4 +1,4 @@
-"""Small inputs for tests that go through many commands: a log of an axis and a campaign of two runs."""
+"""Small inputs for tests of many commands: a log of an axis and a campaign of two runs."""
 
 from pathlib import Path
 
@@ -14,7 +14,7 @@ matrix: {law.position.gain: [25, 26]}
 
 
 def log_of(folder: Path) -> Path:
-    """A small log of an axis, as a logger writes it."""
+    """A small log of an axis in the form of a logger."""
     t = np.arange(600) / 100
     u = np.sin(5 * t) + np.sin(1.3 * t)
     x = np.cumsum(np.cumsum(u)) * 1e-4

@@ -1,4 +1,4 @@
-"""The names that scripts use."""
+"""Public names of the package."""
 
 import subprocess
 import sys
@@ -9,18 +9,18 @@ import pytest
 import rtctl
 
 
-def test_every_name_is_there_and_described():
+def test_every_public_name_exists_and_is_documented():
     for name in rtctl.__all__:
         assert getattr(rtctl, name).__doc__, name
     assert set(rtctl.__all__) == set(rtctl._WHERE) and set(rtctl.__all__) <= set(dir(rtctl))
 
 
-def test_there_are_no_others():
+def test_unknown_name_is_an_attribute_error():
     with pytest.raises(AttributeError, match="no attribute 'rnu'"):
         _ = rtctl.rnu  # type: ignore[attr-defined]
 
 
-def test_import_brings_nothing_heavy():
+def test_import_loads_nothing_heavy():
     code = "import sys, rtctl; print([m for m in ('numpy', 'numba', 'pydantic', 'zmq') if m in sys.modules])"
     done = subprocess.run([sys.executable, "-S", "-c", code], capture_output=True, text=True, env={"PYTHONPATH": PATH})
     assert (done.stdout, done.stderr) == ("[]\n", "")
@@ -49,7 +49,7 @@ def test_record_compare_and_replay(tmp_path):
     assert [s["t"] for s in rtctl.steps(bundle)] == [s["t"] for s in rtctl.steps(tmp_path / "a")]
 
 
-def test_mistakes_are_told(tmp_path):
+def test_invalid_arguments_are_user_errors(tmp_path):
     with pytest.raises(rtctl.UserError, match="did you mean 'gain'"):
         rtctl.load_config("ivu", {"law.position.gian": 3})
     with pytest.raises(rtctl.UserError, match="not a folder"):

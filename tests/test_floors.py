@@ -1,4 +1,4 @@
-"""Order of the floors: a package imports only from those below it (docs/architecture.md)."""
+"""Layers of the packages: a package imports only from lower layers (docs/architecture.md)."""
 
 import ast
 from collections.abc import Iterator
@@ -23,7 +23,7 @@ def imported(tree: ast.AST) -> Iterator[str]:
 
 
 def floor_of(parts: tuple[str, ...]) -> str | None:
-    """Package that a path or a dotted name belongs to; None where it is no floor."""
+    """Package of a path or dotted name; None outside of the layers."""
     name = parts[1] if parts[0] == "rtctl" and len(parts) > 1 else parts[0]
     return name if name in FLOORS else None
 

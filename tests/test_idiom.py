@@ -1,4 +1,4 @@
-"""Steps: the same function for compiled code and for Python, compiled for each when it is asked for."""
+"""Steps: one function for compiled code and for Python, compiled on demand."""
 
 import numpy as np
 import pytest
@@ -30,7 +30,7 @@ def s():
     return np.zeros(1, STATE)
 
 
-def test_python_and_compiled_code_get_the_same_bits(s):
+def test_python_and_compiled_calls_are_bit_exact(s):
     x = np.random.default_rng(1).normal(size=100)
     there = np.zeros(1, STATE)
     here = [third(s[0], value) for value in x.tolist()][-1]
@@ -38,7 +38,7 @@ def test_python_and_compiled_code_get_the_same_bits(s):
     assert there == s and s["n"] == 100
 
 
-def test_for_compiled_code_there_are_no_wrappers(s):
+def test_compiled_calls_have_no_wrappers(s):
     @tick
     def inner(x):
         return x + 1.0
@@ -49,7 +49,7 @@ def test_for_compiled_code_there_are_no_wrappers(s):
     assert inner(2.0) == 3.0
 
 
-def test_it_is_the_function_that_was_written():
+def test_step_keeps_name_docstring_and_module():
     assert (third.__name__, third.__doc__, third.__module__) == ("third", "Sum of thirds.", __name__)
     assert third.py_func(np.zeros(1, STATE).view(np.recarray)[0], 3.0) == 1.0
 
@@ -62,7 +62,7 @@ def test_division_by_zero_does_not_raise():
     assert divided(1.0, 0.0) == np.inf
 
 
-def test_the_interpreter_gets_the_same_bits_and_nothing_is_compiled(s):
+def test_interpreted_call_is_bit_exact_and_compiles_nothing(s):
     @tick
     def ninth(s, x):
         """A step that calls another one."""
@@ -76,10 +76,10 @@ def test_the_interpreter_gets_the_same_bits_and_nothing_is_compiled(s):
     assert [len(step._outer.nopython_signatures) for step in (third, ninth)] == compiled
 
 
-def test_a_step_that_fails_in_the_interpreter_leaves_the_others_compiled(s):
+def test_failed_interpreted_step_leaves_other_steps_compiled(s):
     @tick
     def fails(s):
-        """Python alone raises here."""
+        """Raises in Python only."""
         raise KeyError(0)
 
     with pytest.raises(KeyError):

@@ -1,4 +1,4 @@
-"""No code compares with the name of a term or of a machine: what is told about one stands in its own file."""
+"""No code compares with the name of a term or of a machine; such properties are declared in one file each."""
 
 import ast
 from pathlib import Path
@@ -17,7 +17,7 @@ FAMILIES = {name.partition(".")[0] for name in TERMS}
 
 
 def told(text: str) -> list[str]:
-    """Names of terms, with or without a parameter, and beginnings of them, among the strings of a module."""
+    """Term names (with or without a parameter) and their prefixes among the strings of a module."""
     strings = [n.value for n in ast.walk(ast.parse(text)) if isinstance(n, ast.Constant) and isinstance(n.value, str)]
     beginnings = {f"{family}." for family in FAMILIES}
     return [s for s in strings if s in TERMS or s.rpartition(".")[0] in TERMS or s in beginnings]
@@ -35,7 +35,7 @@ def test_no_module_compares_with_the_name_of_a_term():
 @pytest.mark.parametrize(
     "text", ['x == "drive.lag"', '{"drive.lag": 1}', 'x.startswith("ripple.")', '"transmission.creep.kappa"']
 )
-def test_a_name_is_seen_wherever_it_stands(text):
+def test_term_name_is_found_in_any_expression(text):
     assert told(text)
     assert not told('"""The term drive.lag comes late."""')
 
@@ -49,7 +49,7 @@ def words(node: ast.AST) -> set[str]:
 
 
 def asked(node: ast.AST) -> list[ast.AST]:
-    """What a piece of code compares with, looks up, or has as a key."""
+    """Nodes that are compared, looked up or used as keys."""
     if isinstance(node, ast.Compare):
         return [node.left, *node.comparators]
     if isinstance(node, ast.Dict):
@@ -64,7 +64,7 @@ def asked(node: ast.AST) -> list[ast.AST]:
 
 
 def by_machine(text: str) -> list[int]:
-    """Lines of a module that ask for the name of a machine."""
+    """Lines of a module that compare with the name of a machine."""
     return [
         getattr(node, "lineno", getattr(getattr(node, "pattern", None), "lineno", 0))
         for node in ast.walk(ast.parse(text))
@@ -87,10 +87,10 @@ def test_no_module_compares_with_the_name_of_a_machine():
     ['kind == "ivu"', 'kind not in ("ldu", "axis")', '{"ivu": 1}[kind]', 'table["ldu"]', 'table.get("axis")',
      'kind in {"axis": 1}', 'match kind:\n    case "ivu": pass'],
 )  # fmt: skip
-def test_a_comparison_with_a_machine_is_seen(text):
+def test_comparison_with_a_machine_name_is_found(text):
     assert by_machine(text)
 
 
 @pytest.mark.parametrize("text", ['"""ivu == ldu"""', 'machine: Literal["ivu"] = "ivu"', 'load("ivu")'])
-def test_the_name_of_a_machine_may_be_a_value(text):
+def test_machine_name_may_be_a_value(text):
     assert not by_machine(text)

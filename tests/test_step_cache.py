@@ -1,4 +1,4 @@
-"""Compiled steps on disk: found again by another process's step, and only by one that is the same."""
+"""Cache of compiled steps on disk: found by equal steps of other processes only."""
 
 from pathlib import Path
 from typing import Any
@@ -31,8 +31,8 @@ def hits(step: Step) -> int:
     return sum(step._outer._cache_hits.values())
 
 
-def test_a_step_that_was_compiled_is_found_again_and_gives_the_same_bits(folder: Path, params: Any) -> None:
-    first, again = Step(pd.step.py_func), Step(pd.step.py_func)  # as two processes would have it
+def test_cached_step_is_found_and_bit_exact(folder: Path, params: Any) -> None:
+    first, again = Step(pd.step.py_func), Step(pd.step.py_func)  # as in two processes
     here = call(first, params)
     assert hits(first) == 0 and any(folder.rglob("step_*"))
     there = call(again, params)
@@ -40,7 +40,7 @@ def test_a_step_that_was_compiled_is_found_again_and_gives_the_same_bits(folder:
     assert there[0] == here[0] and there[1] == here[1]
 
 
-def test_other_types_are_another_file(folder: Path, params: Any) -> None:
+def test_other_types_have_another_cache_file(folder: Path, params: Any) -> None:
     call(Step(pd.step.py_func), params)
     kept = set(folder.rglob("step_*"))
     other = Step(pd.step.py_func)
@@ -49,7 +49,7 @@ def test_other_types_are_another_file(folder: Path, params: Any) -> None:
     assert hits(other) == 0 and set(folder.rglob("step_*")) > kept
 
 
-def test_types_that_are_only_written_alike_are_told_apart(
+def test_different_types_with_equal_text_are_distinguished(
     folder: Path, params: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(step_cache.StepCache, "_path", lambda *_: folder / "steps" / "one")
@@ -59,7 +59,7 @@ def test_types_that_are_only_written_alike_are_told_apart(
     assert hits(other) == 0
 
 
-def test_a_changed_source_is_another_folder(folder: Path, params: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_changed_source_has_another_cache_folder(folder: Path, params: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     call(Step(pd.step.py_func), params)
     monkeypatch.setattr(step_cache, "sources_hash", lambda: "f" * 64)
     other = Step(pd.step.py_func)
@@ -68,7 +68,7 @@ def test_a_changed_source_is_another_folder(folder: Path, params: Any, monkeypat
 
 
 @pytest.mark.parametrize("damage", [b"", b"\x80\x04damaged", None])
-def test_a_file_that_was_cut_short_is_compiled_anew(folder: Path, params: Any, damage: bytes | None) -> None:
+def test_truncated_cache_file_is_compiled_again(folder: Path, params: Any, damage: bytes | None) -> None:
     expected = call(Step(pd.step.py_func), params)
     for path in folder.rglob("step_*"):
         path.write_bytes(path.read_bytes()[:-100] if damage is None else damage)
@@ -78,15 +78,13 @@ def test_a_file_that_was_cut_short_is_compiled_anew(folder: Path, params: Any, d
     assert call(again, params)[0] == expected[0] and hits(again) == 1
 
 
-def test_a_folder_that_cannot_be_written_is_no_obstacle(
-    tmp_path: Path, params: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_unwritable_cache_folder_is_ignored(tmp_path: Path, params: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("RTCTL_CACHE_DIR", str(tmp_path / "file" / "cache"))
     assert len(call(Step(pd.step.py_func), params)[0]) == 3
 
 
-def test_what_is_not_rtctls_own_or_depends_on_more_is_not_kept(folder: Path) -> None:
+def test_foreign_or_closure_steps_are_not_cached(folder: Path) -> None:
     def made(factor: float) -> Step:
         @tick
         def scaled(x: float) -> float:
@@ -97,7 +95,7 @@ def test_what_is_not_rtctls_own_or_depends_on_more_is_not_kept(folder: Path) -> 
     assert made(2.0)(3.0) == 6.0 and made(3.0)(3.0) == 9.0
     assert not any(folder.rglob("scaled_*"))
     assert step_cache.is_kept(pd.step.py_func)
-    assert not step_cache.is_kept(test_a_changed_source_is_another_folder)
+    assert not step_cache.is_kept(test_changed_source_has_another_cache_folder)
 
 
 def test_every_step_of_the_library_is_in_the_hash() -> None:

@@ -1,4 +1,4 @@
-"""The modules of benchmarks/, which are scripts beside each other and no package."""
+"""Fixture: modules of benchmarks/, a folder of scripts without a package."""
 
 import importlib
 from collections.abc import Callable, Iterator

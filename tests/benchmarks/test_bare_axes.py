@@ -1,4 +1,4 @@
-"""The axes that nobody wrote friction down for rub as their equations say, the same every time, and are judged so."""
+"""Benchmark axes without friction in the nominal model: equations, repeatability, scores."""
 
 import json
 from collections.abc import Callable
@@ -15,14 +15,14 @@ def axes(benchmark_module: Callable[[str], ModuleType]) -> ModuleType:
     return benchmark_module("bare_axes")
 
 
-def test_at_one_speed_the_drive_pays_for_both_frictions(axes):
+def test_drive_force_at_constant_speed_equals_both_frictions(axes):
     carriage = axes.Carriage(2.0, 5.0, 3.0, 3.0, 0.01, 3e5, 50.0, 0.0, 0.0)
     ref = 0.1 * axes.DT * np.arange(4000)  # m, at 0.1 m/s
     _, u = axes.moved(carriage, axes.Loop(15.0, 40.0, 3.0, 1e-7), ref, np.zeros(4000))
     assert 3.0 * np.mean(u[2000:]) == pytest.approx(3.0 + 5.0 * 0.1, rel=0.01)
 
 
-def test_a_case_is_a_bundle_and_the_same_every_time(axes, tmp_path):
+def test_axis_case_is_a_repeatable_bundle(axes, tmp_path):
     assert axes.conceal(tmp_path / "a", 7, 1) == ("friction.stribeck",)
     axes.conceal(tmp_path / "b", 7, 1)
     one, two = (load_record(tmp_path / name) for name in "ab")
@@ -30,7 +30,7 @@ def test_a_case_is_a_bundle_and_the_same_every_time(axes, tmp_path):
     assert set(one.case.parameters) == {"M"}
 
 
-def test_what_is_told_is_counted(axes, tmp_path):
+def test_diagnoses_of_the_axes_are_scored(axes, tmp_path):
     hidden = {"a": (), "b": ("friction.stribeck",), "c": ("drive.offset",), "d": ("friction.stribeck",)}
     told = {"a": ("named", [*axes.PLAIN, axes.BRISTLES]), "b": ("named", [*axes.PLAIN]),
             "c": ("ambiguous", [*axes.PLAIN, "friction.asymmetry", "drive.offset"]), "d": ("unnamed", [])}  # fmt: skip

@@ -1,4 +1,4 @@
-"""Baselines find what is plain, write the exchange form and are scored as the tool itself is."""
+"""Baseline methods: plain effects, exchange format, and scores as for rtctl."""
 
 import json
 
@@ -11,7 +11,7 @@ from rtctl.trace.bundle import load_bundle
 
 @pytest.fixture(scope="module")
 def moving(benchmark_module):
-    """States of an axis of 10 kg that moves smoothly, with this friction (N by speed) and noise."""
+    """States of a smoothly moving axis of 10 kg, with friction (N by speed) and noise."""
 
     def make(friction, owner_has_dry=False, n=1500):
         t = np.linspace(0.0, 12.0, n)
@@ -32,7 +32,7 @@ def moving(benchmark_module):
     return make
 
 
-def test_bic_counts_parameters_and_errors(benchmark_module):
+def test_bic_depends_on_parameters_and_errors(benchmark_module):
     bic = benchmark_module("baselines.inverse_dynamics").bic
     assert bic(100.0, 100, 3) == pytest.approx(3 * np.log(100))
     assert bic(100.0, 100, 4) - bic(100.0, 100, 3) == pytest.approx(np.log(100))
@@ -49,14 +49,14 @@ def test_bic_counts_parameters_and_errors(benchmark_module):
         (lambda v, x: 0.0 * v, []),
     ],
 )
-def test_inverse_dynamics_names_what_is_plain(benchmark_module, moving, friction, names):
+def test_inverse_dynamics_names_a_plain_effect(benchmark_module, moving, friction, names):
     inverse = benchmark_module("baselines.inverse_dynamics")
     s = moving(friction)
     chosen = inverse.forward(s.a, inverse.base_columns(s), inverse.regressors(s))
     assert [r.name for r in chosen] == names
 
 
-def test_what_the_owners_model_has_is_not_named(benchmark_module, moving):
+def test_effect_of_the_nominal_model_is_not_named(benchmark_module, moving):
     inverse = benchmark_module("baselines.inverse_dynamics")
     s = moving(lambda v, x: 3.0 * np.sign(v), owner_has_dry=True)
     assert "friction.coulomb" not in {r.name for r in inverse.regressors(s)}
@@ -72,12 +72,12 @@ def test_every_regressor_has_rows_and_a_name_of_the_exchange_format(benchmark_mo
         assert r.name in form.AXES or r.name == ""
 
 
-def test_play_follows_at_a_distance(benchmark_module):
+def test_backlash_operator_follows_with_its_half_width(benchmark_module):
     out = benchmark_module("baselines.inverse_dynamics").play(np.array([0.0, 1.0, 2.0, 1.8, 0.0]), 1.0)
     assert out.tolist() == [0.0, 0.5, 1.5, 1.5, 0.5]
 
 
-def test_white_is_white_and_coloured_is_not(benchmark_module):
+def test_whiteness_test_separates_white_and_coloured_noise(benchmark_module):
     ljung_box = benchmark_module("baselines.whiteness").ljung_box
     e = np.random.default_rng(2).standard_normal(4000)
     assert ljung_box(e) > 0.01
@@ -87,7 +87,7 @@ def test_white_is_white_and_coloured_is_not(benchmark_module):
     assert 0.35 < np.mean(p) < 0.65
 
 
-def test_sparse_functions_are_finite_and_known_ones_are_among_them(benchmark_module, moving):
+def test_sparse_library_is_finite_and_contains_the_known_functions(benchmark_module, moving):
     sparse = benchmark_module("baselines.sparse")
     s = moving(lambda v, x: 3.0 * np.sign(v), owner_has_dry=True)
     functions = sparse.library(s)
@@ -101,7 +101,7 @@ def cases(tmp_path_factory):
     return generate(tmp_path_factory.mktemp("proof") / "cases", 2, 3, plants=("axis",))
 
 
-def test_a_folder_is_diagnosed_and_scored(benchmark_module, cases, tmp_path, capsys):
+def test_folder_of_cases_is_diagnosed_and_scored(benchmark_module, cases, tmp_path, capsys):
     main = benchmark_module("diagnosis_baselines").main
     assert main([str(cases), "--json", "--only", "inverse", "coulomb", "--out", str(tmp_path)]) == 0
     rows = json.loads(capsys.readouterr().out)
@@ -116,7 +116,7 @@ def test_a_folder_is_diagnosed_and_scored(benchmark_module, cases, tmp_path, cap
     assert load_bundle(cases / "case-0001").case["plant"] == "axis"
 
 
-def test_the_table_has_a_row_for_each_method(benchmark_module, cases, capsys):
+def test_table_has_a_row_for_each_method(benchmark_module, cases, capsys):
     assert benchmark_module("diagnosis_baselines").main([str(cases), "--only", "coulomb", "inverse"]) == 0
     out = capsys.readouterr().out
     assert "| always Coulomb |" in out and "| inverse dynamics" in out
@@ -124,6 +124,6 @@ def test_the_table_has_a_row_for_each_method(benchmark_module, cases, capsys):
     assert len({line.count("|") for line in rows}) == 1
 
 
-def test_without_answers_it_says_so(benchmark_module, tmp_path, capsys):
+def test_scores_without_answers_are_reported_as_missing(benchmark_module, tmp_path, capsys):
     assert benchmark_module("diagnosis_baselines").main([str(tmp_path)]) == 2
     assert "answers.json" in capsys.readouterr().err

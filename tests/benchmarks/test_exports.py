@@ -1,4 +1,4 @@
-"""The benchmark of exports measures what it says, in a second of a recording."""
+"""Benchmark of exports on a recording of one second."""
 
 import json
 import subprocess
@@ -8,7 +8,7 @@ from pathlib import Path
 SCRIPT = Path(__file__).parents[2] / "benchmarks" / "exports.py"
 
 
-def test_each_format_is_measured_as_a_share_of_json():
+def test_size_of_each_format_is_relative_to_json():
     command = [sys.executable, str(SCRIPT), "--json", "--minutes", "0.02", "--to", "mcap-json,mcap"]
     found = json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
     assert found["rows"] == 12000 and set(found["exports"]) == {"mcap", "mcap-json"}

@@ -1,4 +1,4 @@
-"""What the comparison with cyclictest and LinuxCNC counts, computes, and says where neither is there."""
+"""Comparison with cyclictest and LinuxCNC: counts, figures, and missing peers."""
 
 import json
 import os
@@ -41,7 +41,7 @@ def hal(p50: float, ns: float) -> dict[str, Any]:
     return {"lateness_us": late(p50), "law_ns": law(ns), "thread_ns": law(2 * ns), "ticks": 100}
 
 
-def test_the_ratio_is_the_median_over_the_rounds(peers: ModuleType) -> None:
+def test_ratio_is_the_median_over_the_rounds(peers: ModuleType) -> None:
     done = {
         "ours": [run(10.0), run(20.0), run(90.0)],
         "cyclictest": [late(10.0), late(10.0), late(100.0)],
@@ -58,21 +58,21 @@ def test_the_ratio_is_the_median_over_the_rounds(peers: ModuleType) -> None:
     assert "times HAL's" in peers.report(result)
 
 
-def test_a_target_can_be_missed(peers: ModuleType) -> None:
+def test_missed_target_is_reported(peers: ModuleType) -> None:
     done = {"ours": [run(12.0)], "cyclictest": [late(10.0)], "hal": [hal(10.0, 10.0)], "law": [law(21.0)]}
     result = peers.result_of(done, {}, 10_000.0, 3.0)
     assert result["met"] == {"lateness_cyclictest": False, "lateness_hal": False, "law": False}
     assert "missed: law" in peers.report(result)
 
 
-def test_a_peer_that_gave_up_is_left_out(peers: ModuleType) -> None:
+def test_failed_peer_is_left_out(peers: ModuleType) -> None:
     done = {"ours": [run(12.0)] * 2, "cyclictest": [late(10.0)] * 2, "hal": [hal(10.0, 10.0)], "law": [law(5.0)] * 2}
     result = peers.result_of(done, {"hal": "it gave up"}, 10_000.0, 3.0)
     assert "hal" not in result and "law_ratio" not in result and set(result["lateness_ratio"]) == {"cyclictest"}
     assert "not compared with hal: it gave up" in peers.report(result)
 
 
-def test_cost_is_not_moved_by_ticks_that_were_interrupted(peers: ModuleType) -> None:
+def test_cost_is_robust_to_interrupted_ticks(peers: ModuleType) -> None:
     counts = np.array([100] * 99 + [1_000_000])
     found = peers.cost(counts, 2.0)
     assert found["middle"] == found["p50"] == 50.0
@@ -80,16 +80,16 @@ def test_cost_is_not_moved_by_ticks_that_were_interrupted(peers: ModuleType) -> 
 
 
 @pytest.mark.parametrize("json_", [True, False])
-def test_with_neither_it_says_so_and_ends_with_3(tmp_path: Path, json_: bool) -> None:
+def test_missing_peers_are_exit_code_3(tmp_path: Path, json_: bool) -> None:
     command = [sys.executable, str(BENCHMARKS / "peers.py"), *(["--json"] if json_ else [])]
     done = subprocess.run(command, capture_output=True, text=True, env={**os.environ, "PATH": str(tmp_path)})
     assert done.returncode == 3, done.stderr
     said = json.loads(done.stdout)["skipped"] if json_ else done.stdout
-    # a machine without SCHED_FIFO or a second CPU has a reason of its own
+    # another reason without SCHED_FIFO or a second CPU
     assert any(word in said for word in ("cyclictest is not installed", "SCHED_FIFO", "one CPU"))
 
 
-def test_the_law_runs_at_every_tick(benchmark_module: Callable[[str], ModuleType]) -> None:
+def test_law_runs_at_every_tick(benchmark_module: Callable[[str], ModuleType]) -> None:
     took, per_ns = benchmark_module("hal.law").run(2_000.0, 0.05, 1)
     assert len(took) == 100 and (took > 0).all()
     assert per_ns > 0
@@ -108,8 +108,8 @@ def library(session: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Pa
         pytest.skip(f"no C compiler that makes wakeup.so: {reason}")
 
 
-def test_every_sleep_until_a_time_is_counted(session: ModuleType, library: Path, tmp_path: Path) -> None:
-    """Python's own sleep is clock_nanosleep(TIMER_ABSTIME) on CLOCK_MONOTONIC as well."""
+def test_every_absolute_sleep_is_counted(session: ModuleType, library: Path, tmp_path: Path) -> None:
+    """The sleep of Python is also clock_nanosleep(TIMER_ABSTIME) on CLOCK_MONOTONIC."""
     counts = tmp_path / "counts"
     counts.write_bytes(bytes(4 * (session.BUCKETS + 1)))
     code = "import time\nfor _ in range(20): time.sleep(0.001)"
@@ -118,17 +118,17 @@ def test_every_sleep_until_a_time_is_counted(session: ModuleType, library: Path,
     )
     found = np.fromfile(counts, np.uint32)
     assert found.sum() == 20
-    assert found[0] == 0  # no sleep ends early, nor at once
+    assert found[0] == 0  # no sleep ends early or at once
 
 
 @pytest.mark.realtime
-def test_a_hal_thread_gives_lateness_and_times(
+def test_hal_thread_gives_lateness_and_times(
     peers: ModuleType, session: ModuleType, library: Path, tmp_path: Path
 ) -> None:
     reason = session.why_not()
     if reason is not None:
         pytest.skip(reason)
-    folder = Path("/tmp") / f"rtb-test-{os.getpid()}"  # rtapi_app goes through it as another user
+    folder = Path("/tmp") / f"rtb-test-{os.getpid()}"  # accessible to rtapi_app, which runs as another user
     folder.mkdir(mode=0o711)
     try:
         shared = folder / "wakeup.so"

@@ -1,4 +1,4 @@
-"""The springs of the benchmark lose what their loops say, are the same every time, and are judged as they are told."""
+"""Benchmark springs with hysteresis: loops, repeatability, scores."""
 
 import json
 from collections.abc import Callable
@@ -15,7 +15,7 @@ def springs(benchmark_module: Callable[[str], ModuleType]) -> ModuleType:
     return benchmark_module("soft_bristles")
 
 
-def test_pushed_slowly_the_bristles_hold_their_limit_both_ways(springs):
+def test_bristle_force_reaches_its_limit_in_both_directions(springs):
     F, k = 3.0, 1000.0
     t = np.arange(3000 * springs.FINE) / springs.RATE / springs.FINE
     u = 20.0 * np.sin(2 * np.pi * 0.5 * t)
@@ -28,12 +28,12 @@ def test_pushed_slowly_the_bristles_hold_their_limit_both_ways(springs):
     np.testing.assert_allclose((held - rub)[late], F * np.sign(np.gradient(x)[late]), atol=0.02 * F)
 
 
-def test_without_it_the_spring_is_the_owners(springs):
+def test_spring_without_bristles_is_the_nominal_one(springs):
     x = springs.moved(1.0, 20.0, 100.0, 0.0, 1.0, springs.NONE, np.full(6000 * springs.FINE, 5.0))
     assert x[-1] == pytest.approx(0.05, rel=1e-3)
 
 
-def test_a_case_is_a_bundle_and_the_same_every_time(springs, tmp_path):
+def test_spring_case_is_a_repeatable_bundle(springs, tmp_path):
     assert springs.conceal(tmp_path / "a", 7, 2) == springs.KINDS[2]
     springs.conceal(tmp_path / "b", 7, 2)
     one, two = (load_record(tmp_path / name) for name in "ab")
@@ -41,7 +41,7 @@ def test_a_case_is_a_bundle_and_the_same_every_time(springs, tmp_path):
     assert set(one.case.parameters) == {"M", "F_v", "k"}
 
 
-def test_what_is_told_is_counted(springs, tmp_path):
+def test_diagnoses_of_the_springs_are_scored(springs, tmp_path):
     none, slides, never = springs.KINDS[0], springs.KINDS[2], springs.KINDS[7]
     both = sorted(springs.LAW)
     told = {"a": (none, "nothing", []), "b": (slides, "named", both), "c": (never, "unnamed", []),

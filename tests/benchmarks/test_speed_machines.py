@@ -1,4 +1,4 @@
-"""The drives that show a speed are what their equations say, the same every time, and judged as they are told."""
+"""Benchmark drives with a speed sensor: equations, repeatability, scores."""
 
 import json
 from collections.abc import Callable
@@ -15,7 +15,7 @@ def machines(benchmark_module: Callable[[str], ModuleType]) -> ModuleType:
     return benchmark_module("speed_machines")
 
 
-def test_a_plain_drive_rises_to_its_speed(machines):
+def test_nominal_drive_reaches_its_speed(machines):
     drive = machines.Drive(2.0, 4.0, 6.0)
     t = np.arange(200) / 100.0
     v = machines.speed_of(drive, np.ones(200), 0.01, 200)
@@ -24,7 +24,7 @@ def test_a_plain_drive_rises_to_its_speed(machines):
     np.testing.assert_allclose(late[10:], v[:-10], atol=1e-12)
 
 
-def test_each_effect_changes_what_is_shown(machines):
+def test_each_effect_changes_the_measured_speed(machines):
     rng = np.random.default_rng(0)
     u = machines.volts(rng, np.arange(1000) / 100.0) * np.linspace(0.5, 1.0, 1000)
     plain = machines.Drive(2.0, 4.0, 6.0)
@@ -34,7 +34,7 @@ def test_each_effect_changes_what_is_shown(machines):
         assert np.std(machines.speed_of(given, u, 0.01, 200) - v) > 0.01 * np.std(v), name
 
 
-def test_a_case_is_a_bundle_and_the_same_every_time(machines, tmp_path):
+def test_drive_case_is_a_repeatable_bundle(machines, tmp_path):
     number = machines.KINDS.index(("blind", "rings"))
     true = machines.conceal(tmp_path / "a", 7, number)
     assert true == ("sensor.rectified", "structure.resonance")
@@ -45,7 +45,7 @@ def test_a_case_is_a_bundle_and_the_same_every_time(machines, tmp_path):
     assert "sensor" not in (tmp_path / "a" / "case.json").read_text().replace('"sensors"', "")
 
 
-def test_what_is_told_is_counted(machines, tmp_path):
+def test_diagnoses_of_the_drives_are_scored(machines, tmp_path):
     hidden = {"a": ("drive.lag",), "b": (), "c": ("drive.lag",), "d": ("drive.lag",), "e": ()}
     told = {"a": ("named", ["drive.lag"]), "b": ("nothing", []), "c": ("ambiguous", ["timing.delay", "drive.lag"]),
             "d": ("named", ["timing.delay"]), "e": ("unnamed", [])}  # fmt: skip

@@ -23,7 +23,7 @@ BASE = {
 
 @pytest.fixture
 def write(tmp_path: Path) -> Callable[..., Path]:
-    """`write(matrix={...})`: the campaign above with other keys, as a file; None leaves a key out."""
+    """`write(matrix={...})`: file of the campaign above with changed keys; None omits a key."""
 
     def make(**changes: Any) -> Path:
         data = {key: value for key, value in {**BASE, **changes}.items() if value is not None}
@@ -36,12 +36,12 @@ def write(tmp_path: Path) -> Callable[..., Path]:
 
 @pytest.fixture
 def plan(write: Callable[..., Path]) -> Callable[..., Plan]:
-    """`plan(matrix={...})` is the plan of such a file."""
+    """`plan(matrix={...})`: plan of a file of `write`."""
     return lambda **changes: load_plan(str(write(**changes)), load_config)
 
 
 @pytest.fixture
 def blank(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Pictures of nothing: to draw them takes longer than the runs do."""
+    """Stub of the plots: drawing would take longer than the runs."""
     for name in ("overlay", "distributions", "along", "png"):
         monkeypatch.setattr(f"rtctl.campaign.figures.{name}", lambda *_: "")

@@ -1,4 +1,4 @@
-"""Axes: lists, ranges, draws, several that step together, files; and what is wrong with them."""
+"""Axes: lists, ranges, random values, linked axes, files, and errors."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -27,11 +27,11 @@ def values(plan: Plan, name: str) -> list[Any]:
         ({"values": {"soft": 10, "stiff": 40}}, [10, 40]),
     ],
 )
-def test_values_are_in_si(plan: Make, axis: Any, expected: list[Any]) -> None:
+def test_axis_values_are_in_si_units(plan: Make, axis: Any, expected: list[Any]) -> None:
     assert values(plan(matrix={"law.position.gain": axis}), "law.position.gain") == expected
 
 
-def test_random_values_come_from_the_seed(plan: Make) -> None:
+def test_random_values_depend_on_the_seed_only(plan: Make) -> None:
     def draw(seed: int) -> list[float]:
         axis = {"random": ["22 mm", "38 mm"], "count": 50, "seed": seed}
         return values(plan(matrix={"radius.R1": axis}), "radius.R1")
@@ -40,7 +40,7 @@ def test_random_values_come_from_the_seed(plan: Make) -> None:
     assert all(0.022 <= x <= 0.038 for x in draw(1)) and len(set(draw(1))) == 50
 
 
-def test_several_paths_step_together(plan: Make) -> None:
+def test_linked_paths_step_together(plan: Make) -> None:
     radii = {
         "together": {
             "R1": {"paths": ["radius.R1", "plant.parameters.R1"], "values": ["38 mm", "30 mm"]},
@@ -53,7 +53,7 @@ def test_several_paths_step_together(plan: Make) -> None:
     assert (config.radius.R1, config.plant.parameters.R1, config.radius.R2) == (0.03, 0.03, 0.032)
 
 
-def test_labels_and_lists(plan: Make) -> None:
+def test_labels_of_list_valued_axes(plan: Make) -> None:
     faults = {"values": {"none": [], "frozen": [{"fault": "encoder.freeze", "at": "0.6 s"}]}}
     made = plan(
         matrix={"faults": faults, "plant.physics": [[], [{"term": "friction.coulomb", "node": "motor1", "F_C": 1e-3}]]}
@@ -63,9 +63,9 @@ def test_labels_and_lists(plan: Make) -> None:
     assert made.config(2).faults[0].fault == "encoder.freeze" and made.config(2).faults[0].at == 0.6
 
 
-def test_references_are_files(plan: Make, tmp_path: Path) -> None:
+def test_reference_axis_takes_files(plan: Make, tmp_path: Path) -> None:
     (tmp_path / "jump.yaml").write_text("steps: [{at: 0.2 s, to: 12.5 mm}]\n".replace("12.5 mm", "57.3 deg"))
-    made = plan(matrix={"reference": ["steps", "jump.yaml"]})  # shipped, and beside the campaign
+    made = plan(matrix={"reference": ["steps", "jump.yaml"]})  # shipped, and next to the campaign
     assert made.labels(1) == {"reference": "jump.yaml"}
     assert made.config(0).reference.steps[3].at == 10.0
     assert made.config(1).reference.steps[0].to == pytest.approx(1.0, rel=1e-3)
@@ -100,7 +100,7 @@ def test_references_are_files(plan: Make, tmp_path: Path) -> None:
         ({"loop.seed": {"range": [1, 1001]}, "law.position.gain": {"range": [1, 1001]}}, "1000000 are the most"),
     ],
 )
-def test_mistakes_say_file_line_and_key(plan: Make, matrix: Any, words: str) -> None:
+def test_axis_error_names_file_line_and_key(plan: Make, matrix: Any, words: str) -> None:
     with pytest.raises(UserError) as caught:
         plan(matrix=matrix)
     said = str(caught.value)

@@ -1,4 +1,4 @@
-"""One run: the same rows as a run by itself, modules shared between runs of one structure, mistakes told in the row."""
+"""One run of a campaign: rows equal to a single run, modules shared by structure, errors in the result row."""
 
 from collections.abc import Callable
 from typing import Any
@@ -14,7 +14,7 @@ from rtctl.loop import fused, generate
 Make = Callable[..., Plan]
 
 
-def test_a_run_is_what_it_is_by_itself(plan: Make) -> None:
+def test_campaign_run_is_bit_exact_with_a_single_run(plan: Make) -> None:
     made = plan()
     rows, alone = cell.play(made, 4).rows, fused.run(made.config(4), 1.8).rows
     for name in rows.dtype.names or ():
@@ -33,7 +33,7 @@ def test_runs_that_differ_in_numbers_share_a_module(plan: Make, monkeypatch: pyt
 
 
 @pytest.mark.parametrize("change", [{"law.position.gain": 20}, {"loop.seed": 9}, {"plant.parameters.R1": 0.03}])
-def test_structure_is_that_of_the_generated_text(plan: Make, change: dict[str, Any]) -> None:
+def test_structure_key_follows_the_generated_source(plan: Make, change: dict[str, Any]) -> None:
     one = machines.build(plan(matrix={}).config(0))
     other = machines.build(plan(matrix={k: [v] for k, v in change.items()}).config(0))
     assert cell.structure(one) is cell.structure(other)
@@ -49,7 +49,7 @@ def test_another_diagram_is_another_structure(plan: Make) -> None:
         assert cell.structure(machine).path != cell.structure(plain).path
 
 
-def test_a_broken_cell_is_told_in_its_row(plan: Make) -> None:
+def test_failed_run_has_its_error_in_its_row(plan: Make) -> None:
     made = plan(matrix={"law.position.gain": [-3, 31]})
     broken, whole = (cell.run_row(made, n) for n in range(2))
     assert "law.position.gain: -3 V/rad is out of bounds" in broken["error"]
@@ -57,17 +57,17 @@ def test_a_broken_cell_is_told_in_its_row(plan: Make) -> None:
     assert whole["error"] == "" and 0 < whole["final_error_mm"] < 0.1
 
 
-def test_a_trip_has_a_time_and_no_final_error(plan: Make) -> None:
+def test_tripped_run_has_a_trip_time_and_no_final_error(plan: Make) -> None:
     made = plan(matrix={"faults": [[{"fault": "encoder.freeze", "at": 0.6}]]})
     row = cell.run_row(made, 0)
     assert row["trip"] == "encoder_frozen" and row["error"] == ""
     assert 0.6 < row["trip_s"] < 1.2 and row["final_error_mm"] is None and row["peak_output_V"] > 1
 
 
-def test_a_run_that_never_ran(plan: Make) -> None:
+def test_run_that_never_starts_is_an_error(plan: Make) -> None:
     assert "give it more `seconds`" in cell.run_row(plan(seconds=0.2), 0)["error"]
 
 
-def test_a_chunk_by_another_process_is_the_same(plan: Make) -> None:
+def test_chunk_of_another_process_is_bit_exact(plan: Make) -> None:
     made = plan()
     assert cell.run_chunk(made.payload, made.identity, 2) == [cell.run_row(made, n) for n in made.numbers(2)]

@@ -1,4 +1,4 @@
-"""Regressions: what noise makes is none, what is beyond it is one."""
+"""Regressions: changes beyond the noise of the seeds."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -20,7 +20,7 @@ MATRIX = {"law.position.gain": [25, 31], "loop.seed": {"range": [1, SEEDS]}}
 
 @pytest.fixture
 def made_up(plan: Make, tmp_path: Path) -> Callable[..., tuple[Any, Path]]:
-    """`made_up("new", error=f)`: a finished campaign whose metrics are numbers of our own, f(gain, seed)."""
+    """`made_up("new", error=f)`: a finished campaign with synthetic metrics f(gain, seed)."""
 
     def make(name: str, error: Any, trip: Any = lambda gain, seed: "", **changes: Any) -> tuple[Any, Path]:
         made = plan(**{"matrix": MATRIX, "metrics": ["final_error_mm", "tension_min_N"], **changes})
@@ -49,7 +49,7 @@ def test_noise_is_no_regression(made_up: Any) -> None:
     assert found.matched == 2 * SEEDS and found.regressions == 0 and {c.verdict for c in found.changes} == {SAME}
 
 
-def test_a_change_beyond_noise_is_marked_where_it_is(made_up: Any) -> None:
+def test_change_beyond_noise_is_a_regression_of_its_group(made_up: Any) -> None:
     folder = made_up("old", noise(0.002, 1))[1]
     worse = noise(0.002, 2)
     plan, table = made_up("new", lambda gain, seed: worse(gain, seed) + (0.02 if gain == 31 else 0.0))[0]
@@ -59,7 +59,7 @@ def test_a_change_beyond_noise_is_marked_where_it_is(made_up: Any) -> None:
     assert found.regressions == 1 and found.of(WORSE)[0].change == pytest.approx(0.02, abs=0.003)
 
 
-def test_without_seeds_five_percent_count(made_up: Any) -> None:
+def test_regression_threshold_without_seeds_is_five_percent(made_up: Any) -> None:
     few = {"matrix": {"law.position.gain": [25, 31]}}
     folder = made_up("old", lambda gain, seed: 1.0, **few)[1]
     plan, table = made_up("new", lambda gain, seed: {25: 1.04, 31: 1.06}[int(gain)], **few)[0]
@@ -67,20 +67,20 @@ def test_without_seeds_five_percent_count(made_up: Any) -> None:
     assert [c.group["law.position.gain"] for c in found.of(WORSE)] == [31] and np.isnan(found.of(WORSE)[0].noise)
 
 
-def test_a_run_that_breaks_is_a_regression(made_up: Any) -> None:
+def test_newly_failed_run_is_a_regression(made_up: Any) -> None:
     folder = made_up("old", noise(0.0, 1), trip=lambda g, s: "link_lost" if (g, s) == (25, 3) else "")[1]
     plan, table = made_up("new", noise(0.0, 1), trip=lambda g, s: "link_lost" if (g, s) == (31, 2) else "")[0]
     found = compare(plan, table, folder)
     assert found.broken == [SEEDS + 1] and len(found.mended) == 1 and found.regressions == 1
 
 
-def test_only_matching_runs_count(made_up: Any) -> None:
+def test_only_matching_runs_are_compared(made_up: Any) -> None:
     folder = made_up("old", noise(0.0, 1), matrix={**MATRIX, "law.position.gain": [31, 40]})[1]
     plan, table = made_up("new", noise(0.0, 1))[0]
     assert compare(plan, table, folder).matched == SEEDS
 
 
-def test_a_metric_that_is_lost_is_a_regression(made_up: Any) -> None:
+def test_lost_metric_is_a_regression(made_up: Any) -> None:
     folder = made_up("old", noise(0.001, 1))[1]
     plan, table = made_up("new", lambda g, s: None if (g, s) == (31, 4) else noise(0.001, 1)(g, s))[0]
     worse = compare(plan, table, folder).of(WORSE)
@@ -95,7 +95,7 @@ def test_a_metric_that_is_lost_is_a_regression(made_up: Any) -> None:
         ({"law.position.gain": [70], "loop.seed": [1]}, "nothing to compare"),
     ],
 )
-def test_campaigns_that_do_not_go_together(made_up: Any, matrix: Any, words: str) -> None:
+def test_campaigns_that_do_not_match_are_refused(made_up: Any, matrix: Any, words: str) -> None:
     folder = made_up("old", noise(0.0, 1), matrix=matrix)[1]
     plan, table = made_up("new", noise(0.0, 1))[0]
     with pytest.raises(UserError, match=words):
@@ -103,7 +103,7 @@ def test_campaigns_that_do_not_go_together(made_up: Any, matrix: Any, words: str
 
 
 @pytest.mark.usefixtures("blank")
-def test_in_the_report(plan: Make, tmp_path: Path) -> None:
+def test_report_contains_the_regressions(plan: Make, tmp_path: Path) -> None:
     campaign.run(plan(matrix=MATRIX), tmp_path / "old")
     slower = {"reference": {"steps": [{"at": 0.1, "to": 1.0}]}, "law.shaper.bandwidth": "5 rad/s"}
     found = campaign.run(plan(matrix=MATRIX, set=slower), tmp_path / "new", baseline=tmp_path / "old")

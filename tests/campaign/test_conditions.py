@@ -23,10 +23,10 @@ X = np.array([0.1, 0.2, np.nan, 0.4])
         ("final_error_mm.median == 2e-1", True, 0.2),
         ("trip.count > 0", True, 1.0),
         ("error.share > 0", False, 0.0),
-        ("settling_s.p99 > 5", True, np.nan),  # nobody has it: cannot be judged
+        ("settling_s.p99 > 5", True, np.nan),  # no run has the metric
     ],
 )
-def test_judged(text: str, failed: bool, value: float) -> None:
+def test_conditions_are_judged(text: str, failed: bool, value: float) -> None:
     columns = {"final_error_mm": X, "settling_s": np.full(4, np.nan)}
     columns |= {"trip": np.array([True, False, False, False]), "error": np.zeros(4, bool)}
     found = judge(parse(text, METRICS), columns, 4, None)
@@ -49,7 +49,7 @@ def test_judged(text: str, failed: bool, value: float) -> None:
         ("x" * 10_000, "not a condition"),
     ],
 )
-def test_mistakes(text: str, words: str) -> None:
+def test_invalid_condition_is_refused(text: str, words: str) -> None:
     with pytest.raises(UserError, match="fail-on") as caught:
         parse(text, METRICS)
     assert words in str(caught.value) and len(str(caught.value)) < 500
@@ -64,7 +64,7 @@ def test_regressions_need_a_baseline() -> None:
 
 @given(st.text(max_size=60))
 @settings(deadline=None)
-def test_any_text_is_a_condition_or_a_sentence(text: str) -> None:
+def test_any_text_is_a_condition_or_a_user_error(text: str) -> None:
     try:
         parse(text, METRICS)
     except UserError as error:
@@ -73,7 +73,7 @@ def test_any_text_is_a_condition_or_a_sentence(text: str) -> None:
 
 @given(st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=30))
 @settings(deadline=None)
-def test_statistics_are_in_order(values: list[float]) -> None:
+def test_statistics_are_ordered_from_min_to_max(values: list[float]) -> None:
     x = np.array([*values, np.nan])
     found = {name: statistic(name, x, len(x)) for name in STATISTICS}
     assert found["min"] <= found["median"] <= found["p90"] + 1e-9 <= found["p95"] + 2e-9 <= found["p99"] + 3e-9

@@ -1,4 +1,4 @@
-"""docs/campaigns.md says what there is."""
+"""docs/campaigns.md agrees with the code."""
 
 import re
 from pathlib import Path
@@ -19,7 +19,7 @@ def text() -> str:
     return DOC.read_text(encoding="utf-8")
 
 
-def test_the_file_in_it_is_a_campaign(text: str, tmp_path: Path) -> None:
+def test_documented_file_is_a_campaign(text: str, tmp_path: Path) -> None:
     block = re.search(r"```yaml\n(.*?)```", text, re.S)
     assert block is not None
     path = tmp_path / "gains.yaml"
@@ -29,6 +29,6 @@ def test_the_file_in_it_is_a_campaign(text: str, tmp_path: Path) -> None:
     assert set(re.findall(r"^(\w+):", block[1], re.M)) == set(CampaignSettings.model_fields)
 
 
-def test_every_metric_statistic_and_kind_of_axis_is_in_it(text: str) -> None:
+def test_every_metric_statistic_and_kind_of_axis_is_documented(text: str) -> None:
     words = set(re.findall(r"[\w.]+", text))
     assert {*METRICS, *STATISTICS, *COUNTS, *AxisSettings.model_fields} <= words

@@ -1,4 +1,4 @@
-"""A campaign file as a plan: what it says of every run, and what it refuses."""
+"""Plan of a campaign file: settings of every run, and refused files."""
 
 import json
 from collections.abc import Callable
@@ -16,7 +16,7 @@ from rtctl.config.errors import UserError
 Make = Callable[..., Plan]
 
 
-def test_every_combination_once_the_last_axis_fastest(plan: Make) -> None:
+def test_plan_has_every_combination_once_with_the_last_axis_fastest(plan: Make) -> None:
     made = plan()
     assert made.runs == 6
     assert [tuple(made.labels(n).values()) for n in range(6)] == [(g, s) for g in (25, 31.0) for s in (1, 2, 3)]
@@ -25,14 +25,14 @@ def test_every_combination_once_the_last_axis_fastest(plan: Make) -> None:
     assert made.config(0).loop.mode == "fused" and made.config(0).faults[0].size == pytest.approx(0.02)
 
 
-def test_a_plan_survives_json_to_the_bit(plan: Make) -> None:
+def test_plan_survives_json_bit_exact(plan: Make) -> None:
     made = plan(matrix={"radius.R1": {"random": [0.02, 0.04], "count": 5, "seed": 3}})
     again = Plan(json.loads(json.dumps(made.payload)))
     assert again.identity == made.identity and again.schema.equals(made.schema)
     assert [again.config(n) for n in range(5)] == [made.config(n) for n in range(5)]
 
 
-def test_another_campaign_has_another_hash(plan: Make) -> None:
+def test_changed_campaign_has_another_hash(plan: Make) -> None:
     one = plan().identity
     assert one == plan().identity
     assert (
@@ -41,12 +41,12 @@ def test_another_campaign_has_another_hash(plan: Make) -> None:
     )
 
 
-def test_several_machines(plan: Make) -> None:
+def test_plan_with_several_machines(plan: Make) -> None:
     made = plan(config="ivu", set={}, matrix={"config": ["ivu", "ldu"], "loop.seed": [1, 2]})
     assert [made.config(n).machine for n in range(4)] == ["ivu", "ivu", "ldu", "ldu"]
 
 
-def test_a_machines_config_is_a_campaign_of_one_run(tmp_path: Path) -> None:
+def test_machine_config_is_a_campaign_of_one_run(tmp_path: Path) -> None:
     data = yaml.safe_load(Path("configs/ldu.yaml").read_text()) if Path("configs/ldu.yaml").exists() else None
     if data is None:
         pytest.skip("not run from the project's root: configs/ldu.yaml is missing")
@@ -56,12 +56,12 @@ def test_a_machines_config_is_a_campaign_of_one_run(tmp_path: Path) -> None:
     made = load_plan(str(path), load_config)
     assert made.runs == 1 and made.config(0).machine == "ldu" and made.config(0).loop.mode == "fused"
     machine = machines.build(made.config(0))
-    assert made.ticks(machine) == round(3.0 * machine.rate)  # once through, and 2 s
+    assert made.ticks(machine) == round(3.0 * machine.rate)  # length of the reference plus 2 s
     longer = load_plan(str(path), load_config, seconds=5.0)
     assert longer.ticks(machine) == round(5.0 * machine.rate)
 
 
-def test_the_shipped_campaign() -> None:
+def test_shipped_campaign_loads() -> None:
     made = load_plan("radii_10000", load_config)
     assert made.runs == 10_000
     for n in (0, 4321, 9999):
@@ -88,14 +88,14 @@ def test_the_shipped_campaign() -> None:
         ({"reference": "nowhere"}, "reference: 'nowhere': no such file"),
     ],
 )
-def test_mistakes_say_file_line_and_key(write: Callable[..., Path], changes: Any, words: str) -> None:
+def test_plan_error_names_file_line_and_key(write: Callable[..., Path], changes: Any, words: str) -> None:
     path = write(**changes)
     with pytest.raises(UserError) as caught:
         load_plan(str(path), load_config)
     assert words in str(caught.value) and str(path) in str(caught.value)
 
 
-def test_an_empty_file_and_none(tmp_path: Path) -> None:
+def test_empty_and_missing_files_are_refused(tmp_path: Path) -> None:
     (tmp_path / "empty.yaml").write_text("")
     with pytest.raises(UserError, match="missing key 'campaign'"):
         load_plan(str(tmp_path / "empty.yaml"), load_config)
@@ -103,7 +103,7 @@ def test_an_empty_file_and_none(tmp_path: Path) -> None:
         load_plan(str(tmp_path / "none.yaml"), load_config)
 
 
-def test_a_run_that_does_not_fit_into_memory(plan: Make) -> None:
+def test_run_that_does_not_fit_into_memory_is_refused(plan: Make) -> None:
     made = plan(seconds=1e6)
     with pytest.raises(UserError, match="a run of a campaign has 2 to"):
         made.ticks(machines.build(made.config(0)))

@@ -1,4 +1,4 @@
-"""The same rows to the bit, whoever computes them."""
+"""Pools of workers: result rows are bit-exact for every pool."""
 
 from collections.abc import Callable
 from concurrent.futures import Future
@@ -20,12 +20,12 @@ def here(made: Plan) -> dict[int, Any]:
     return dict(pools.compute(made, range(made.chunks), 1, None))
 
 
-def test_a_pool_gives_the_same_rows(plan: Make) -> None:
+def test_process_pool_gives_bit_exact_rows(plan: Make) -> None:
     made = plan(matrix=BROKEN)
     assert dict(pools.compute(made, range(made.chunks), 2, None)) == here(made)
 
 
-def test_dask_gives_the_same_rows(plan: Make) -> None:
+def test_dask_gives_bit_exact_rows(plan: Make) -> None:
     distributed = pytest.importorskip("distributed", reason="Dask (distributed) is not installed")
     made = plan(matrix=BROKEN)
     with distributed.LocalCluster(
@@ -35,20 +35,20 @@ def test_dask_gives_the_same_rows(plan: Make) -> None:
 
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nowhere", "smtp://127.0.0.1:1"])
-def test_no_scheduler_there(plan: Make, monkeypatch: pytest.MonkeyPatch, address: str) -> None:
+def test_missing_dask_scheduler_is_an_error(plan: Make, monkeypatch: pytest.MonkeyPatch, address: str) -> None:
     pytest.importorskip("distributed", reason="Dask (distributed) is not installed")
     monkeypatch.setattr(workers, "PATIENCE", 0.3)
     with pytest.raises(UserError, match="no Dask scheduler answers"):
         list(pools.compute(plan(), [0], 1, address))
 
 
-def test_without_dask_it_says_what_to_install(plan: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_dask_error_names_the_package(plan: Make, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(__import__("sys").modules, "distributed", None)
     with pytest.raises(UserError, match=r"pip install 'rtctl\[dask\]'"):
         list(pools.compute(plan(), [0], 1, "tcp://127.0.0.1:8786"))
 
 
-def test_a_worker_that_dies(plan: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_dead_worker_is_an_error(plan: Make, monkeypatch: pytest.MonkeyPatch) -> None:
     class Pool:
         def __init__(self, *_: Any) -> None: ...
 

@@ -1,4 +1,4 @@
-"""The folder of a campaign: resumed to the bit, never mixed with another."""
+"""Folder of a campaign: bit-exact resumption, never mixed with another campaign."""
 
 import json
 from collections.abc import Callable
@@ -24,13 +24,13 @@ def fill(store: Store, *chunks: int) -> Store:
 
 @pytest.fixture
 def half(plan: Make, tmp_path: Path) -> tuple[Plan, Path]:
-    """A campaign of which three of six chunks are done, out of order."""
+    """A campaign with three of six chunks done, out of order."""
     made = plan()
     fill(Store(tmp_path / "out", made), 4, 0, 2)
     return made, tmp_path / "out"
 
 
-def test_resumed_it_is_the_same_file(half: tuple[Plan, Path], tmp_path: Path) -> None:
+def test_resumed_campaign_gives_an_identical_file(half: tuple[Plan, Path], tmp_path: Path) -> None:
     made, folder = half
     store = Store(folder, made)
     assert store.done() == {0, 2, 4} and not store.finished()
@@ -40,7 +40,7 @@ def test_resumed_it_is_the_same_file(half: tuple[Plan, Path], tmp_path: Path) ->
     assert Store(folder, made).done() == set(range(6)) and not (folder / PARTS).exists()
 
 
-def test_the_table(half: tuple[Plan, Path]) -> None:
+def test_result_table_has_columns_and_units(half: tuple[Plan, Path]) -> None:
     made, folder = half
     table = fill(Store(folder, made), 1, 3, 5).finish()
     assert table["run"].to_pylist() == list(range(6))
@@ -50,14 +50,14 @@ def test_the_table(half: tuple[Plan, Path]) -> None:
     assert plan.identity == made.identity and read.equals(table.select(read.schema.names))
 
 
-def test_a_damaged_part_is_computed_again(half: tuple[Plan, Path]) -> None:
+def test_damaged_part_is_computed_again(half: tuple[Plan, Path]) -> None:
     made, folder = half
     path = folder / PARTS / "part-000002.parquet"
     path.write_bytes(path.read_bytes()[:-20])
     assert Store(folder, made).done() == {0, 4}
 
 
-def test_a_part_of_another_campaign_does_not_count(half: tuple[Plan, Path], plan: Make, tmp_path: Path) -> None:
+def test_part_of_another_campaign_is_ignored(half: tuple[Plan, Path], plan: Make, tmp_path: Path) -> None:
     made, folder = half
     other = plan(seconds=1.7)
     fill(Store(tmp_path / "other", other), 1)
@@ -76,12 +76,12 @@ def test_a_part_of_another_campaign_does_not_count(half: tuple[Plan, Path], plan
         ({"campaign": "x", "metrics": ["final_error_mm"]}, "another campaign and another metrics"),
     ],
 )
-def test_another_campaign_is_refused(half: tuple[Plan, Path], plan: Make, changes: Any, words: str) -> None:
+def test_folder_of_another_campaign_is_refused(half: tuple[Plan, Path], plan: Make, changes: Any, words: str) -> None:
     with pytest.raises(UserError, match=words):
         Store(half[1], plan(**changes))
 
 
-def test_folders_that_do_not_do(plan: Make, tmp_path: Path) -> None:
+def test_unsuitable_folder_is_refused(plan: Make, tmp_path: Path) -> None:
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "thesis.tex").write_text("")
     with pytest.raises(UserError, match="holds no campaign"):
@@ -93,7 +93,7 @@ def test_folders_that_do_not_do(plan: Make, tmp_path: Path) -> None:
         load_results(tmp_path)
 
 
-def test_results_that_cannot_be_read(half: tuple[Plan, Path]) -> None:
+def test_unreadable_results_are_an_error(half: tuple[Plan, Path]) -> None:
     made, folder = half
     with pytest.raises(UserError, match="was not finished"):
         load_results(folder)
@@ -108,7 +108,7 @@ def test_results_that_cannot_be_read(half: tuple[Plan, Path]) -> None:
         load_results(folder)
 
 
-def test_columns_of_several_kinds_are_text(plan: Make, tmp_path: Path) -> None:
+def test_columns_of_mixed_types_are_text(plan: Make, tmp_path: Path) -> None:
     made = plan(matrix={"radius.source": ["given"], "plant.rate": [None, 2000]})
     table = fill(Store(tmp_path / "out", made), 0, 1).finish()
     assert table["plant.rate"].to_pylist() == [None, "2000"]

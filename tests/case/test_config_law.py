@@ -1,4 +1,4 @@
-"""The law by the config of our own recordings, and what of it no simulation of a diagnosis computes."""
+"""Law from the config of a rtctl recording, and the parts that a diagnosis does not simulate."""
 
 from typing import Any
 
@@ -14,7 +14,7 @@ def config(machine: str, law: dict[str, Any], **parts: Any) -> dict[str, Any]:
     return {"name": "it", "machine": machine, "loop": {"rate": 1000.0}, "law": law, **parts}
 
 
-def test_the_law_of_each_machine_is_known():
+def test_law_of_each_shipped_machine_is_known():
     law = config_law(config("axis", {"position": PI, "shaper": {"bandwidth": 20.0}}))
     assert isinstance(law, ConfigLaw) and law.kind == "pi_velocity" and isinstance(law.config, AxisConfig)
     assert isinstance(config_law(config("ldu", {"position": {"kind": "sections", "sections": []}})), ConfigLaw)
@@ -31,12 +31,12 @@ def test_the_law_of_each_machine_is_known():
         ("axis", {"position": {"kind": "./my_law.py:MyLaw", "gain": 1.0}}, {}, "own file, ./my_law.py:MyLaw"),
     ],
 )
-def test_what_is_not_computed_is_said(machine, law, parts, word):
+def test_parts_that_are_not_simulated_are_reported(machine, law, parts, word):
     found = config_law(config(machine, law, **parts))
     assert isinstance(found, UnsaidLaw) and len(found.parts) == 1
     assert word in found.parts[0]
 
 
 @pytest.mark.parametrize("given", [None, {}, {"machine": "lathe"}, config("axis", {"position": {"kind": "of later"}})])
-def test_a_config_that_cannot_be_read_says_nothing(given):
+def test_unreadable_config_gives_no_law(given):
     assert config_law(given) is None

@@ -15,7 +15,7 @@ def read(controller, machine=PENDULUM, **more):
     return case.controller, [warning for warning in case.warnings if "controller" in warning]
 
 
-def test_a_law_is_read_with_its_only_sensor_and_drive():
+def test_law_is_read_with_its_only_sensor_and_drive():
     law, warnings = read({**PD, "derivative_filter_hz": 80.0})
     assert law == WiredPd(P=4.0, D=0.3, derivative_filter_hz=80.0, sensor="encoder", drive="motor")
     assert warnings == []
@@ -26,13 +26,13 @@ def test_a_law_is_read_with_its_only_sensor_and_drive():
     assert isinstance(law, WiredCascade) and law.sensor == "encoder"
 
 
-def test_of_several_sensors_the_law_names_its_own():
+def test_law_must_name_its_sensor_if_there_are_several():
     assert read({**PD, "sensor": "scale"}, BELT)[0].sensor == "scale"
     law, (warning,) = read(PD, BELT)
     assert law is None
     assert "controller: sensor is missing; name the one that the law reads, encoder or scale; the recorded" in warning
     both = {**PENDULUM, "sensors": {**TACHO["sensors"], **PENDULUM["sensors"]}}
-    assert read(PD, both)[0].sensor == "encoder"  # a position goes before a speed
+    assert read(PD, both)[0].sensor == "encoder"  # position is preferred over speed
     assert read(PD, {**PENDULUM, **TACHO})[0].sensor == "tacho"
 
 
@@ -42,24 +42,24 @@ def test_of_several_sensors_the_law_names_its_own():
     (PD, {**PENDULUM, "drives": {}}, "the machine has no drive"),
     (PD, {**PENDULUM, "drives": {n: {"body": "rod", "column": n} for n in "ab"}}, "drive is missing; name the one"),
 ])  # fmt: skip
-def test_a_law_that_cannot_be_used_is_told(controller, machine, sentence):
+def test_unusable_law_is_a_warning(controller, machine, sentence):
     law, warnings = read(controller, machine)
     assert law is None and len(warnings) == 1
     assert sentence in warnings[0] and warnings[0].endswith("the recorded command is taken as the input")
 
 
-def test_a_problem_without_a_loop_has_no_law():
+def test_open_loop_problem_has_no_law():
     assert "in a free problem no law commands a drive" in read(PD, problem="free")[1][0]
 
 
-def test_a_law_that_the_owner_does_not_know_is_not_read():
+def test_unknown_law_is_not_read():
     assert read({"kind": "pd"}, controller_known=False) == (None, [])
     assert read({"kind": "unknown"}) == (None, [])
     assert read(None) == (None, [])
     assert read_case(case_of(PENDULUM, controller={"kind": "none"}), "bench").open_loop
 
 
-def test_unknown_keys_are_told():
+def test_unknown_controller_keys_are_warned_of():
     law, warnings = read({**PD, "tension_N": 0.1, "senser": "encoder"})
     assert law.sensor == "encoder"
     assert len(warnings) == 2 and "controller.senser" in warnings[1] and "is it 'sensor'?" in warnings[1]
@@ -77,7 +77,7 @@ def test_unknown_keys_are_told():
     ({**PD, "drive": "moter"}, {}, "controller.drive: there is no drive 'moter'; it should be motor (is it 'motor'?)"),
     (PD, {"controller_known": "yes"}, "controller_known is 'yes'; it should be true or false"),
 ])  # fmt: skip
-def test_refusals(controller, more, sentence):
+def test_invalid_controller_is_refused(controller, more, sentence):
     with pytest.raises(UserError, match=r"^bench/case\.json: ") as error:
         read(controller, **more)
     assert sentence in str(error.value)

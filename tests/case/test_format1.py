@@ -17,7 +17,7 @@ def refused(case):
     return str(error.value)
 
 
-def test_reads_what_the_owner_believes():
+def test_nominal_values_are_read():
     case = read_case(case_of("ivu"), "bundle")
     assert case.sample_rate == 500.0
     assert case.parameters["R1"] == 0.038
@@ -28,12 +28,12 @@ def test_reads_what_the_owner_believes():
     assert (case.tolerance("J_m1"), case.tolerance("R1"), case.tolerance("R_c")) == (0.15, 0.02, 0.0)
 
 
-def test_sections_beyond_those_that_a_simulation_holds_are_refused():
+def test_more_sections_than_the_simulation_supports_are_refused():
     controller = {"kind": "long", "sections": [[1.0, 0.0, 0.0, 0.0, 0.0]] * 9}
     assert "controller: sections: has 9 items" in refused(case_of("ldu", controller=controller))
 
 
-def test_takes_each_kind_of_controller():
+def test_each_kind_of_controller_is_read():
     assert isinstance(read_case(case_of("ldu"), "b").controller, SectionsLaw)
     assert isinstance(read_case(case_of("axis"), "b").controller, CascadeLaw)
     assert isinstance(read_case(case_of("axis", controller={"kind": "none"}), "b").controller, NoLaw)
@@ -41,20 +41,20 @@ def test_takes_each_kind_of_controller():
     assert isinstance(pd.controller, SectionsLaw)
 
 
-def test_a_pd_as_a_section_has_its_gain_at_rest_and_its_slope():
+def test_pd_as_a_section_has_its_dc_gain_and_slope():
     b0, b1, b2, a1, a2 = pd_section(2360.5, 154.4335, 200.0, 1e-4)
     assert (b0 + b1 + b2) / (1 + a1 + a2) == pytest.approx(2360.5)
     assert b0 == pytest.approx(2360.5 + 154.4335 * (1 - math.exp(-2 * math.pi * 200 * 1e-4)) / 1e-4)
 
 
-def test_an_unknown_controller_is_a_warning_and_its_command_the_input():
+def test_unknown_controller_is_a_warning_and_the_command_is_the_input():
     case = read_case(case_of("ldu", controller={"kind": "sliding_mode"}), "bundle")
     assert isinstance(case.controller, UnknownLaw)
     assert not case.controller_known
     assert "sliding_mode" in case.unsaid
 
 
-def test_unknown_keys_are_warned_of_with_the_nearest_name():
+def test_unknown_key_warning_suggests_the_nearest_name():
     strange = case_of("ivu", parameters__tau_FC=1.0, drive__limit_volts=5.0, sensors__colour="red", delay_sample=2.0)
     warnings = " ".join(read_case(strange, "bundle").warnings)
     for said in (
@@ -68,19 +68,19 @@ def test_unknown_keys_are_warned_of_with_the_nearest_name():
         assert said in warnings
 
 
-def test_the_daemons_own_keys_are_no_surprise():
+def test_keys_of_the_daemon_give_no_warning():
     case = case_of("axis", config={}, seed=1, versions={}, run={}, changes=[], rows=5, losses={}, complete=True)
     assert read_case(case, "bundle").warnings == ()
 
 
-def test_a_rotary_axis_has_an_inertia_for_a_mass():
+def test_rotary_axis_has_an_inertia_in_place_of_a_mass():
     drive = {"newton_metre_per_ampere": 0.0083, "unit": "A"}
     case = read_case(case_of("axis", parameters={"J": 2.5e-4}, drive=drive, sample_rate=None), "bundle")
     assert case.sample_rate is None
     assert believed(case) == {"M": 2.5e-4, "K": 0.0083, "F_v": 0.0, "F_c": 0.0, "k": 0.0}
 
 
-def test_absent_terms_are_zero_and_absent_parameters_the_models_own():
+def test_absent_terms_are_zero_and_absent_parameters_have_the_model_defaults():
     case = read_case(case_of("ivu"), "bundle")
     full = believed(case)
     assert full["tau_F1"] == 0.0024
@@ -92,7 +92,7 @@ def test_absent_terms_are_zero_and_absent_parameters_the_models_own():
     assert believed(read_case(case_of("ldu"), "bundle"))["F_c"] == 0.0
 
 
-def test_tolerance_null_means_anything():
+def test_tolerance_null_is_infinite():
     case = read_case(case_of("axis", parameters={}, reaches={"parameter_tolerance": None}), "bundle")
     assert case.tolerance("M") == math.inf
     assert "M" not in believed(case)
@@ -126,7 +126,7 @@ def test_tolerance_null_means_anything():
         ({"reaches__parameter_tolerance": math.inf}, ("reaches.parameter_tolerance", "finite")),
     ],
 )
-def test_what_cannot_be_is_refused_with_its_key(change, said):
+def test_invalid_value_is_refused_with_its_key(change, said):
     message = refused(case_of("ivu", **change))
     assert message.startswith("bundle/case.json")
     assert "\n" not in message
@@ -134,7 +134,7 @@ def test_what_cannot_be_is_refused_with_its_key(change, said):
         assert part in message
 
 
-def test_one_parameter_has_one_value():
+def test_two_values_of_one_parameter_are_refused():
     assert "one and the same" in refused(case_of("axis", parameters={"J": 1.0, "M": 2.0}))
     assert "N is -20" in refused(case_of("ldu", parameters__N=-20.0))
 
@@ -154,7 +154,7 @@ anything = st.recursive(
         anything,
     ),
 )
-def test_no_case_ends_in_anything_but_a_case_or_a_sentence(plant, keys):
+def test_any_case_is_read_or_a_user_error(plant, keys):
     try:
         read_case({"plant": plant, **keys}, "bundle")
     except UserError as error:
@@ -170,7 +170,7 @@ def test_practice_cases_are_read_without_a_warning(shared, name):
     assert set(case.parameters) <= set(believed(case))
 
 
-def test_an_estimate_of_the_program_has_no_tolerance():
+def test_estimated_parameter_has_an_infinite_tolerance():
     case = read_case(case_of("axis", parameters={"F_c": 0.2}), "bundle")
     assert case.estimated == ("M", "F_v", "k")
     assert [case.tolerance(name) for name in ("M", "F_v", "k")] == [math.inf] * 3
@@ -182,7 +182,7 @@ def test_an_estimate_of_the_program_has_no_tolerance():
 
 
 @pytest.mark.parametrize("plant", ["ivu", "ldu", "axis"])
-def test_a_plant_of_the_users_own_is_refused(plant):
+def test_user_plant_is_refused(plant):
     said = refused(case_of(plant, config={"machine": plant, "plant": {"kind": "./my_plant.py:Plant"}}))
     assert "./my_plant.py:Plant" in said
     assert "replay" in said and "not there yet" in said
@@ -190,14 +190,14 @@ def test_a_plant_of_the_users_own_is_refused(plant):
 
 @pytest.mark.parametrize("value", [0, -1, "two", float("nan"), float("inf"), [1], {}, True])
 @pytest.mark.parametrize("name", ["M", "K", "J", "K_m"])
-def test_a_parameter_that_cannot_be_is_told_by_its_name_and_in_the_unit_of_the_axis(name, value):
+def test_impossible_parameter_error_has_the_name_and_unit_of_the_axis(name, value):
     said = refused(case_of("axis", parameters={name: value}, sensors={"unit": "rad"}))
     unit = {"M": "kg m^2", "J": "kg m^2"}.get(name, "Nm/V")
     assert said.startswith(f"bundle/case.json: parameters.{name}") and "kg;" not in said
     assert "should be a" in said or f"it must be more than 0 {unit}" in said
 
 
-def test_a_tolerance_that_the_case_does_not_give_is_told():
+def test_assumed_tolerance_is_reported():
     silent, given = (read_case(case_of("axis", reaches=r), "bundle") for r in ({}, {"parameter_tolerance": 0.15}))
     assert silent.tolerance("M") == given.tolerance("M") == 0.15
     assert [w for w in silent.warnings if "reaches.parameter_tolerance is missing; 0.15 is taken" in w]
@@ -207,12 +207,12 @@ def test_a_tolerance_that_the_case_does_not_give_is_told():
     assert not [w for w in read_case(case_of("axis", reaches={}, parameters={}), "b").warnings if "tolerance" in w]
 
 
-def test_two_names_of_one_parameter_are_both_told():
+def test_error_names_both_names_of_one_parameter():
     said = refused(case_of("axis", parameters={"J": 1.0, "M": 1.0}))
     assert "parameters.J and parameters.M are one and the same" in said
 
 
 @pytest.mark.parametrize(("part", "unit"), [("sensors", "deg"), ("sensors", ""), ("drive", "furlong"), ("drive", 5)])
-def test_a_unit_that_no_axis_has_is_refused(part, unit):
+def test_unit_of_no_axis_is_refused(part, unit):
     said = refused(case_of("axis", **{f"{part}__unit": unit}))
     assert f"{part}: unit" in said and "is not one of" in said

@@ -7,7 +7,7 @@ from rtctl.case.format2 import read_case
 from rtctl.config.errors import UserError
 
 
-def test_defaults_are_told():
+def test_assumed_defaults_are_reported():
     case = {k: v for k, v in case_of(PENDULUM).items() if k not in ("tolerance", "delay_samples")}
     read = read_case(case, "bench")
     assert read.default_tolerance == 0.15
@@ -16,7 +16,7 @@ def test_defaults_are_told():
     assert any("delay_samples is missing; 0 is taken" in w for w in read.warnings)
 
 
-def test_strange_keys_are_told_with_the_nearest_name():
+def test_unknown_key_warning_suggests_the_nearest_name():
     read = read_case(case_of(PENDULUM, tolerence={"default": 0.1}), "bench")
     assert any("tolerence is not a key" in w and "is it 'tolerance'?" in w for w in read.warnings)
 
@@ -33,13 +33,13 @@ def test_strange_keys_are_told_with_the_nearest_name():
         ({"delay_samples": math.nan}, "delay_samples is nan; it should be a finite number"),
     ],
 )
-def test_refusals(change, sentence):
+def test_invalid_case_is_refused(change, sentence):
     with pytest.raises(UserError, match=r"^bench/case\.json: ") as error:
         read_case(case_of(PENDULUM) | change, "bench")
     assert sentence in str(error.value)
 
 
-def test_refused_description_names_the_path():
+def test_invalid_description_error_names_the_path():
     machine = {**BELT, "joints": {"belt": {**BELT["joints"]["belt"], "to": "carrige"}}}
     with pytest.raises(UserError, match=r"case\.json: machine.*no body 'carrige'; did you mean 'carriage'\?"):
         read_case(case_of(machine), "bench")

@@ -25,13 +25,13 @@ from rtctl.diagnose.model.model import nominal
         ({"inputs": {"wind": {"body": "rodd", "column": "f"}}}, "there is no body 'rodd'; did you mean 'rod'?"),
     ],
 )
-def test_refusals(change, sentence):
+def test_invalid_known_terms_are_refused(change, sentence):
     with pytest.raises(UserError, match=r"^bench/case\.json: ") as error:
         read_case(case_of(PENDULUM) | change, "bench")
     assert sentence in str(error.value)
 
 
-def test_numbers_of_known_terms_are_fitted_by_path():
+def test_parameters_of_known_terms_are_fitted_by_path():
     known = [{"term": "friction.stribeck", "node": "rod", "F_s": 0.006, "v_s": 0.3}]
     tolerance = {"default": 0.1, "physics.0.F_s": 0.5, "physics.0.v_s": 0.0}
     case = read_case(case_of(PENDULUM, physics=known) | {"tolerance": tolerance}, "bench")

@@ -6,7 +6,7 @@ from rtctl.case.graph_case import GraphCase
 from rtctl.case.load import read_case
 
 
-def test_a_case_that_names_a_plant_is_of_format_1():
+def test_case_that_names_a_plant_is_of_format_1():
     assert isinstance(read_case(known_case("ldu"), "bench"), Case)
     assert isinstance(read_case(case_of(PENDULUM), "bench"), GraphCase)
     assert isinstance(read_case({**case_of(PENDULUM), "plant": None}, "bench"), GraphCase)

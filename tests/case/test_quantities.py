@@ -1,4 +1,4 @@
-"""Units and nouns of an axis from the units of its columns, in every text that a diagnosis writes."""
+"""Units and nouns of an axis follow the units of its columns in every text of a diagnosis."""
 
 import re
 
@@ -9,8 +9,8 @@ from rtctl.diagnose.evidence.diagnosis import Effect, Interval, LookAlike
 from rtctl.plants.physics import TERMS, nodes
 
 PLACES = [(name, node) for name, term in TERMS.items() for node in nodes(term, "axis")]
-NODE_IDS = re.compile(r"[\w.]+:carriage|\"?node\"?: \"?carriage|\"carriage\": |- carriage")  # as configs name the node
-NUMBER = r"(?:(?<=\d )|(?<=, )|(?<=in )|(?<=\[))"  # a unit stands behind a number, or at the end of a label
+NODE_IDS = re.compile(r"[\w.]+:carriage|\"?node\"?: \"?carriage|\"carriage\": |- carriage")  # node name in configs
+NUMBER = r"(?:(?<=\d )|(?<=, )|(?<=in )|(?<=\[))"  # a unit follows a number or ends a label
 SLIDES = re.compile(
     rf"{NUMBER}(?:[numk]?(?:m|N)(?:/s|/V|/A|/m)?|[numk]?Ns/m|kg)(?![\w^*]| m\^2)"
     r"|N\*s/m|carriage|\b(?:slides|sliding)|\bstrokes?\b|millimetre|micron"
@@ -23,16 +23,16 @@ SHAPES = {  # units of x and u
 
 
 def wrong(text: str, x: str, u: str) -> list[str]:
-    """What a text of an axis with these units must not hold, each with what stands around it."""
+    """Wrong units and nouns in a text of an axis with these units, each with its context."""
     text = NODE_IDS.sub("", text)
-    text = re.sub(r"phi\d? = \S+ [mu]?rad", "", text)  # a phase is an angle on any axis
+    text = re.sub(r"phi\d? = \S+ [mu]?rad", "", text)  # a phase is an angle for any axis
     found = list((SLIDES if x == "rad" else TURNS).finditer(text))
     found += re.finditer(rf"{NUMBER}[mu]?V\b|\bvolt", text) if u != "V" else []
     return [text[max(0, m.start() - 50) : m.end() + 30] for m in found]
 
 
 def effect(name: str, node: str, value: float) -> Effect:
-    """A term with a value for each of its numbers and all that it can be taken for on an axis."""
+    """A term with a value for each parameter and all its equivalent terms on an axis."""
     fields = TERMS[name].settings.model_fields
     numbers = [n for n, f in fields.items() if f.annotation in (float, float | None)]
     alike = [LookAlike(other, n, 0.1) for other in TERMS[name].look_alikes for n in nodes(TERMS[other], "axis")]
@@ -49,12 +49,12 @@ def effect(name: str, node: str, value: float) -> Effect:
         ("rad", "Nm", "kg m^2", "Nm", "", "the rotor"),
     ],
 )
-def test_units_follow_from_the_columns(x, u, inertia, force, gain, body):
+def test_units_in_texts_follow_the_columns(x, u, inertia, force, gain, body):
     q = quantities(x, u)
     assert (q.of("M"), q.of("F_c"), q.of("K"), q.body) == (inertia, force, gain, body)
 
 
-def test_wrong_words_are_seen():
+def test_wrong_units_and_nouns_are_detected():
     for text in ("590 mN", "1.7 mm of play", "the carriage", "speed, m/s", "0.02 kg", "position, um", "2 Ns/m"):
         assert wrong(text, "rad", "V"), text
     for text in ("590 mNm", "2 kg m^2", "3 ms", "4 mrad", "0.1 Nm/V", "node: carriage", "friction.coulomb:carriage"):

@@ -1,4 +1,4 @@
-"""The command line inside the test process, and a daemon outside of it."""
+"""Fixtures: the command line inside the test process, and a daemon in a separate process."""
 
 import contextlib
 import os
@@ -17,7 +17,7 @@ from rtctl.config.errors import UserError
 from rtctl.daemon.client import Client
 from rtctl.daemon.server import default_endpoint
 
-# A busy machine may keep the loop waiting for longer than a real one would bear.
+# Safety limits that do not trip on a busy machine.
 PATIENT = ("loop.realtime=off", "safety.link_timeout=10", "safety.missed_ticks=0", "safety.following_error=0")
 
 
@@ -29,7 +29,7 @@ class Said(NamedTuple):
 
 @pytest.fixture
 def rtctl(capsys: pytest.CaptureFixture[str]) -> Callable[..., Said]:
-    """`rtctl("status", "--json")` gives the exit code and what was printed."""
+    """`rtctl("status", "--json")` returns exit code, stdout and stderr."""
 
     def call(*arguments: Any) -> Said:
         capsys.readouterr()
@@ -41,7 +41,7 @@ def rtctl(capsys: pytest.CaptureFixture[str]) -> Callable[..., Said]:
 
 @contextlib.contextmanager
 def process(*arguments: str) -> Iterator[subprocess.Popen[str]]:
-    """`rtctl` as a process. Whatever happens, it ends, and its children with it."""
+    """`rtctl` as a process. The process and its children end with the context."""
     command = [sys.executable, "-m", "rtctl.cli.main", *arguments]
     run = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env={**os.environ})
     with run:
@@ -58,7 +58,7 @@ def process(*arguments: str) -> Iterator[subprocess.Popen[str]]:
 
 @contextlib.contextmanager
 def daemon(name: str, folder: Path, *more: str) -> Iterator[subprocess.Popen[str]]:
-    """A machine that runs in real time, not armed; entered when its command socket answers and its loop ticks."""
+    """A machine in real mode, not armed. The context starts when the command socket answers and the loop ticks."""
     changes = [word for change in (f"name={name}", *PATIENT) for word in ("--set", change)]
     options = ["--no-arm", "--no-plot", "--json", "--out", str(folder), *changes, *more]
     with process("run", "ivu", "--mode", "real", "--link", "shm", *options) as run:
@@ -85,13 +85,13 @@ def started() -> Callable[..., Any]:
 
 @pytest.fixture
 def running(runtime: Path) -> Callable[..., Any]:
-    """`with running(name, folder) as process:` a machine that is there to be commanded."""
+    """`with running(name, folder) as process:` a running machine that accepts commands."""
     return daemon
 
 
 @pytest.fixture(scope="module")
 def machine(runtime: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """The name of a machine that runs for all tests of a module."""
+    """Name of a machine that runs during all tests of a module."""
     name = f"cli{os.getpid()}"
     with daemon(name, tmp_path_factory.mktemp("run") / "bundle"):
         yield name

@@ -1,4 +1,4 @@
-"""Real boards and FMUs from the command line: a run of each, and what a mistake in them says."""
+"""Real boards and FMUs on the command line: a run of each, and error messages."""
 
 import json
 import os
@@ -45,8 +45,8 @@ def fmu(tmp_path_factory):
 
 
 @pytest.mark.realtime
-def test_a_card_that_fails_in_a_run_is_zeroed_and_told(running, library, tmp_path, monkeypatch):
-    """Its file tells the card of another process that it is broken now."""
+def test_card_that_fails_during_a_run_is_zeroed_and_reported(running, library, tmp_path, monkeypatch):
+    """A file tells the emulated card in the other process to fail."""
     monkeypatch.setenv("CARD_FAILS_IF", str(tmp_path / "broken"))
     name, folder = f"card{os.getpid()}", tmp_path / "bundle"
     with running(name, folder, "--set", f"driver={{kind: comedi, library: {library}}}") as run:
@@ -56,14 +56,14 @@ def test_a_card_that_fails_in_a_run_is_zeroed_and_told(running, library, tmp_pat
             line = run.stderr.readline()
             assert line, heard
             heard += line
-        told = r"/dev/comedi0 \(at-mio-16de-10\): reading input [01]: Input/output error"  # it breaks before either
+        told = r"/dev/comedi0 \(at-mio-16de-10\): reading input [01]: Input/output error"  # channel: chance
         assert re.search(told, heard)
         run.send_signal(signal.SIGINT)
         assert run.wait(60) in (0, 130)
     assert load_bundle(folder).columns["u1"].max() == 0.0
 
 
-def test_an_fmu_runs_in_lockstep_as_the_emulator_of_the_same_equations_does(rtctl, fmu, runtime, tmp_path):
+def test_fmu_in_lockstep_agrees_with_the_emulator_of_the_same_equations(rtctl, fmu, runtime, tmp_path):
     reference = "reference.steps=[{at: 0.2 s, to: 5 mm}]"
     changes = (f"name=f{os.getpid()}", "plant.parameters.F_c=0", reference, FMU.format(file=fmu, sensor="x"))
     words = ["--mode", "lockstep", "--for", "1s", "--no-plot", "--json", "--out", tmp_path / "bundle"]
@@ -73,7 +73,7 @@ def test_an_fmu_runs_in_lockstep_as_the_emulator_of_the_same_equations_does(rtct
     emulated = fused.run(load_config("axis", ["loop.mode=fused", *changes[:3]]), 1.0)["x"]
     assert len(x) == 1000
     assert x.max() > 4e-3
-    # the emulator's output settles for 4 us of each step, the FMU's is there at once
+    # the output of the emulator settles for 4 us of each step, that of the FMU at once
     assert np.abs(x - emulated).max() < 1e-2 * emulated.max()
 
 
@@ -87,7 +87,7 @@ def test_an_fmu_runs_in_lockstep_as_the_emulator_of_the_same_equations_does(rtct
         (["--mode", "lockstep", "--set", FMU.format(file="missing.fmu", sensor="x")], "there is no such file"),
     ],
 )
-def test_a_mistake_is_one_message_before_anything_runs(rtctl, words, message):
+def test_config_mistake_is_one_message_before_the_run(rtctl, words, message):
     code, _, err = rtctl("check", "axis", *words)
     assert code == 2
     assert message in err
@@ -102,7 +102,7 @@ def test_a_mistake_is_one_message_before_anything_runs(rtctl, words, message):
         ("axis_serial", "/dev/ttyACM0 by serial"),
     ],
 )
-def test_the_configs_for_cards_are_right(rtctl, config, plant):
+def test_shipped_board_configs_are_valid(rtctl, config, plant):
     code, out, err = rtctl("check", f"boards/{config}")
     assert (code, plant in out) == (0, True), err
 
@@ -118,32 +118,32 @@ def test_the_configs_for_cards_are_right(rtctl, config, plant):
         ("axis_serial", "driver.timeout=0 s", "driver.timeout"),
     ],
 )
-def test_a_mistake_about_a_bus_is_one_message_before_anything_runs(rtctl, config, change, message):
+def test_bus_config_mistake_is_one_message_before_the_run(rtctl, config, change, message):
     code, _, err = rtctl("check", f"boards/{config}", "--set", change)
     assert (code, message in err) == (2, True), err
 
 
-def test_a_bus_that_is_not_there_is_told(rtctl, runtime):
+def test_missing_bus_is_an_error(rtctl, runtime):
     for config, words in (("axis_odrive", "driver.interface:"), ("axis_serial", "driver.port: there is no /dev/none")):
         where = "driver.interface=nocan7" if config == "axis_odrive" else "driver.port=/dev/none"
         code, _, err = rtctl("plant", f"boards/{config}", "--set", f"name=b{os.getpid()}", "--set", where)
         assert (code, words in err) == (2, True), err
 
 
-def test_an_own_plant_is_neither_a_card_nor_an_fmu(rtctl, tmp_path, monkeypatch):
+def test_user_plant_excludes_a_card_and_an_fmu(rtctl, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert rtctl("new", "plant", "my_plant", "--for", "axis").code == 0
     code, out, err = rtctl("check", "my_plant.yaml")
     assert (code, "emulated" in out) == (0, True), err
 
 
-def test_a_plant_without_its_card_does_not_start(rtctl, runtime):
+def test_plant_without_its_card_does_not_start(rtctl, runtime):
     card = "driver={kind: comedi, library: /nothing.so}"
     code, _, err = rtctl("plant", "boards/ivu_comedi", "--set", f"name=p{os.getpid()}", "--set", card)
     assert (code, "is no libcomedi" in err) == (2, True), err
 
 
-def test_check_reads_the_fmu(rtctl, fmu):
+def test_check_validates_the_variables_of_the_fmu(rtctl, fmu):
     code, _, err = rtctl("check", "axis", "--mode", "lockstep", "--set", FMU.format(file=fmu, sensor="X"))
     assert (code, "did you mean 'x'" in err) == (2, True)
     code, out, _ = rtctl("check", "axis", "--mode", "lockstep", "--set", FMU.format(file=fmu, sensor="x"))
@@ -151,7 +151,7 @@ def test_check_reads_the_fmu(rtctl, fmu):
     assert f"the FMU {fmu}" in out
 
 
-def test_the_wiring_checks_without_a_person(rtctl, library, runtime):
+def test_wiring_check_runs_unattended(rtctl, library, runtime):
     card = f"driver={{kind: comedi, library: {library}}}"
     code, out, err = rtctl("doctor", "--board", "ivu", "--json", "--set", card, "--set", f"name=w{os.getpid()}")
     assert code == 0, err
@@ -170,7 +170,7 @@ def test_the_wiring_checks_without_a_person(rtctl, library, runtime):
         (["--board", "ivu", "--set", "driver={kind: comedi, library: /nothing.so}"], "is no libcomedi"),
     ],
 )
-def test_the_wiring_checks_refuse_what_makes_no_sense(rtctl, runtime, words, message):
+def test_wiring_check_refuses_invalid_arguments(rtctl, runtime, words, message):
     code, _, err = rtctl("doctor", *words, *(["--set", "name=nobody"] if "--board" in words else []))
     assert code == 2
     assert message in err

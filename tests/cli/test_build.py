@@ -7,14 +7,14 @@ from rtctl.cli import build
 
 @pytest.fixture
 def compiled(monkeypatch, tmp_path):
-    """What would have been compiled; with a cache of our own."""
+    """List of requested compilations; the cache is a temporary folder."""
     monkeypatch.setenv("RTCTL_CACHE_DIR", str(tmp_path))
     calls = []
     monkeypatch.setattr(build, "_compile", lambda machine, link: calls.append((machine.kind, link)))
     return calls
 
 
-def test_shows_a_module_and_compiles_nothing(rtctl, compiled):
+def test_build_show_prints_the_module_and_compiles_nothing(rtctl, compiled):
     code, out, err = rtctl("build", "ivu", "--show")
     assert (code, err, compiled) == (0, "", [])
     functions = {node.name for node in ast.parse(out).body if isinstance(node, ast.FunctionDef)}
@@ -30,7 +30,7 @@ def test_shows_a_module_and_compiles_nothing(rtctl, compiled):
         (["--set", "link.plant=external", "--set", "link.endpoint=tcp://127.0.0.1:5570"], "zmq", "run_real"),
     ],
 )
-def test_compiles_what_a_run_needs(rtctl, compiled, tmp_path, words, link, entries):
+def test_build_compiles_the_entry_points_of_a_run(rtctl, compiled, tmp_path, words, link, entries):
     code, out, err = rtctl("build", "ldu", *words)
     assert code == 0
     assert compiled == [("ldu", link)]
@@ -40,7 +40,7 @@ def test_compiles_what_a_run_needs(rtctl, compiled, tmp_path, words, link, entri
     assert rest == f"compiled: {entries}"
 
 
-def test_another_gain_is_the_same_tick_and_another_law_is_not(rtctl, compiled):
+def test_gain_change_keeps_the_tick_and_another_law_changes_it(rtctl, compiled):
     def path(*words):
         return rtctl("build", "ivu", *words).out.split()[0]
 
@@ -48,6 +48,6 @@ def test_another_gain_is_the_same_tick_and_another_law_is_not(rtctl, compiled):
     assert path() != path("--mode", "fused")
 
 
-def test_a_mistake_in_the_config_builds_nothing(rtctl, compiled):
+def test_config_mistake_builds_nothing(rtctl, compiled):
     assert rtctl("build", "ivu", "--set", "law.position.gain=much").code == 2
     assert not compiled

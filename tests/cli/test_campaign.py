@@ -1,4 +1,4 @@
-"""`rtctl campaign`: exit codes, JSON, sentences, and nothing on a terminal that is none."""
+"""`rtctl campaign`: exit codes, JSON, messages, and no progress output without a terminal."""
 
 import json
 from collections.abc import Callable
@@ -31,12 +31,12 @@ def file(tmp_path: Path) -> Callable[..., Path]:
 
 @pytest.fixture(autouse=True)
 def blank(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Pictures of nothing: to draw them takes longer than the runs do."""
+    """Stub of the plots: drawing would take longer than the runs."""
     for name in ("overlay", "distributions", "along", "png"):
         monkeypatch.setattr(f"rtctl.campaign.figures.{name}", lambda *_: "")
 
 
-def test_a_campaign(rtctl: Rtctl, file: Callable[..., Path], tmp_path: Path) -> None:
+def test_campaign_runs_and_reuses_finished_runs(rtctl: Rtctl, file: Callable[..., Path], tmp_path: Path) -> None:
     said = rtctl("campaign", "run", file(), "--jobs", 1, "--out", tmp_path / "out", "--json")
     assert said.code == 0 and said.err == ""
     found = json.loads(said.out)
@@ -46,7 +46,7 @@ def test_a_campaign(rtctl: Rtctl, file: Callable[..., Path], tmp_path: Path) -> 
     assert again.err == "" and "\x1b" not in again.out
 
 
-def test_a_broken_cell_is_exit_code_1(rtctl: Rtctl, file: Callable[..., Path], tmp_path: Path) -> None:
+def test_failed_run_is_exit_code_1(rtctl: Rtctl, file: Callable[..., Path], tmp_path: Path) -> None:
     out = tmp_path / "out"
     said = rtctl("campaign", "run", file([31, -3]), "-j", 1, "--out", out, "--json")
     assert said.code == 1 and json.loads(said.out)["failed"] == 1
@@ -56,7 +56,7 @@ def test_a_broken_cell_is_exit_code_1(rtctl: Rtctl, file: Callable[..., Path], t
     assert json.loads(rtctl("campaign", "list", out, "--json").out)["failures"][0]["run"] == 1
 
 
-def test_fail_on(rtctl: Rtctl, file: Callable[..., Path], tmp_path: Path) -> None:
+def test_fail_on_sets_the_exit_code(rtctl: Rtctl, file: Callable[..., Path], tmp_path: Path) -> None:
     def run(*conditions: str) -> Any:
         options = [word for text in conditions for word in ("--fail-on", text)]
         return rtctl("campaign", "run", file(), "-j", 1, "--out", tmp_path / "out", *options)
@@ -66,7 +66,9 @@ def test_fail_on(rtctl: Rtctl, file: Callable[..., Path], tmp_path: Path) -> Non
     assert said.code == 1 and "final_error_mm.p99 is" in said.err and said.err.count("\n") == 1
 
 
-def test_a_baseline(rtctl: Rtctl, file: Callable[..., Path], tmp_path: Path) -> None:
+def test_regression_against_a_baseline_sets_the_exit_code(
+    rtctl: Rtctl, file: Callable[..., Path], tmp_path: Path
+) -> None:
     rtctl("campaign", "run", file(), "-j", 1, "--out", tmp_path / "old")
     options = ("--baseline", tmp_path / "old", "--fail-on", "regressions.count > 0")
     assert rtctl("campaign", "run", file(), "-j", 1, "--out", tmp_path / "new", *options).code == 0
@@ -85,14 +87,16 @@ def test_a_baseline(rtctl: Rtctl, file: Callable[..., Path], tmp_path: Path) -> 
         (("--jobs", "0"), "jobs"),
     ],
 )
-def test_mistakes_are_exit_code_2(
+def test_invalid_arguments_are_exit_code_2(
     rtctl: Rtctl, file: Callable[..., Path], tmp_path: Path, options: tuple[str, ...], words: str
 ) -> None:
     said = rtctl("campaign", "run", file(), "--out", tmp_path / "out", *options)
     assert said.code == 2 and words in said.err and said.err.count("\n") == 1 and not (tmp_path / "out").exists()
 
 
-def test_files_that_are_none(rtctl: Rtctl, file: Callable[..., Path], tmp_path: Path) -> None:
+def test_invalid_campaign_file_or_folder_is_exit_code_2(
+    rtctl: Rtctl, file: Callable[..., Path], tmp_path: Path
+) -> None:
     said = rtctl("campaign", "run", "radii_1000")
     assert said.code == 2 and "no such file" in said.err
     said = rtctl("campaign", "run", file(matrix={"law.position.gian": [1]}))
@@ -101,12 +105,12 @@ def test_files_that_are_none(rtctl: Rtctl, file: Callable[..., Path], tmp_path: 
     assert said.code == 2 and "is not the folder of a campaign" in said.err
 
 
-def test_another_campaign_is_refused(rtctl: Rtctl, file: Callable[..., Path], tmp_path: Path) -> None:
+def test_folder_of_another_campaign_is_refused(rtctl: Rtctl, file: Callable[..., Path], tmp_path: Path) -> None:
     rtctl("campaign", "run", file(), "-j", 1, "--out", tmp_path / "out")
     said = rtctl("campaign", "run", file([5]), "-j", 1, "--out", tmp_path / "out")
     assert said.code == 2 and "another matrix" in said.err
 
 
-def test_a_machines_config_is_one_run(rtctl: Rtctl, tmp_path: Path) -> None:
+def test_campaign_of_a_machine_config_is_one_run(rtctl: Rtctl, tmp_path: Path) -> None:
     said = rtctl("campaign", "run", "ivu", "--for", "1s", "-j", 1, "--out", tmp_path / "out", "--json")
     assert said.code == 0 and json.loads(said.out)["runs"] == 1

@@ -3,7 +3,7 @@ import pytest
 
 @pytest.fixture(autouse=True)
 def _runtime(runtime):
-    """Names of sockets are printed, so there must be a folder for them."""
+    """Runtime folder, since socket names are printed."""
 
 
 @pytest.mark.parametrize(
@@ -21,7 +21,7 @@ def _runtime(runtime):
         (["ivu", "--set", "name=other", "--set", "loop.rate=1 kHz"], ["other (ivu)", "1000 Hz", "other.telemetry"]),
     ],
 )
-def test_says_ok_and_what_would_run(rtctl, words, seen):
+def test_check_prints_ok_and_a_summary_of_the_run(rtctl, words, seen):
     code, out, err = rtctl("check", *words)
     assert (code, err) == (0, "")
     assert out.splitlines()[0] == "ok"
@@ -41,14 +41,14 @@ def test_says_ok_and_what_would_run(rtctl, words, seen):
         (["ivu", "--set", "name"], ["key=value"]),
     ],
 )
-def test_tells_every_mistake(rtctl, words, seen):
+def test_check_reports_every_mistake(rtctl, words, seen):
     code, out, err = rtctl("check", *words)
     assert (code, out) == (2, "")
     for text in seen:
         assert text in err
 
 
-def test_names_file_and_line(rtctl, tmp_path):
+def test_check_names_file_and_line(rtctl, tmp_path):
     file = tmp_path / "mine.yaml"
     file.write_text("name: mine\nmachine: ivy\n")
     code, _, err = rtctl("check", file)
@@ -58,7 +58,7 @@ def test_names_file_and_line(rtctl, tmp_path):
     assert "machine: missing" in rtctl("check", file).err
 
 
-def test_settings_that_contradict_each_other(rtctl, tmp_path):
+def test_contradictory_settings_are_refused(rtctl, tmp_path):
     file = tmp_path / "backwards.yaml"
     file.write_text("steps:\n  - {at: 2 s, to: 1 rad}\n  - {at: 1 s, to: 0 rad}\n")
     code, out, err = rtctl("check", "ivu", "--reference", file)
@@ -77,7 +77,7 @@ problem: free
 """
 
 
-def test_a_description_alone_is_checked_as_import_takes_it(rtctl, tmp_path):
+def test_machine_description_without_a_config_is_checked(rtctl, tmp_path):
     file = tmp_path / "arm.yaml"
     file.write_text(ARM)
     code, out, err = rtctl("check", file, "--svg", tmp_path / "arm.svg")
@@ -89,7 +89,7 @@ def test_a_description_alone_is_checked_as_import_takes_it(rtctl, tmp_path):
     assert code == 2 and "--mode" in err and "goes with a config" in err
 
 
-def test_a_mistake_in_a_description_alone_has_its_line(rtctl, tmp_path):
+def test_mistake_in_a_machine_description_has_its_line(rtctl, tmp_path):
     file = tmp_path / "arm.yaml"
     file.write_text(ARM.replace("0.03 kg*m^2", "0.03 kg"))
     code, out, err = rtctl("check", file)

@@ -15,19 +15,19 @@ NUMBERS = st.floats(1e-6, 1e6)
 
 @settings(deadline=None)
 @given(NUMBERS, st.sampled_from(list(common.SECONDS)), st.sampled_from(["", " "]))
-def test_durations(number, unit, space):
+def test_durations_are_parsed(number, unit, space):
     assert common.seconds(f"{number}{space}{unit}", "--for") == pytest.approx(number * common.SECONDS[unit])
 
 
 @pytest.mark.parametrize("text", ["", "5x", "s", "-1s", "0", "1e999", "nan", "inf", "1.2.3", "1 2", "5 s 3"])
-def test_what_is_no_duration_is_told_with_its_option(text):
+def test_invalid_duration_error_names_the_option(text):
     with pytest.raises(UserError, match="--for"):
         common.seconds(text, "--for")
 
 
 @settings(deadline=None)
 @given(st.text(max_size=8))
-def test_no_text_breaks_a_duration_or_a_quantity(text):
+def test_random_text_is_a_value_or_a_user_error(text):
     for convert in (common.seconds, common.quantity_of):
         try:
             convert(text, "--for")
@@ -37,14 +37,14 @@ def test_no_text_breaks_a_duration_or_a_quantity(text):
 
 @settings(deadline=None)
 @given(st.floats(allow_nan=False, allow_infinity=False), st.sampled_from(["mm/s", "rad", "%", None]))
-def test_quantities(number, unit):
+def test_quantities_are_parsed(number, unit):
     assert common.quantity_of(f"{number}{unit or ''}", "x") == (number, unit)
     assert common.quantity_of(f" {number} {unit or ''}", "x") == (number, unit)
 
 
 @settings(deadline=None)
 @given(st.recursive(st.none() | st.integers() | st.floats(), lambda x: st.lists(x) | st.dictionaries(st.text(), x)))
-def test_json_never_holds_what_json_cannot(value):
+def test_json_output_is_always_valid_json(value):
     def refuse(word):
         raise AssertionError(word)
 
@@ -75,12 +75,12 @@ def _command(words: list[str], ramp: str = "", name: str = typer.Option("", "--n
         (["5", "--name", "m"], "['5']  m"),
     ],
 )
-def test_negative_numbers_are_no_options(given, heard, capsys):
+def test_negative_numbers_are_arguments(given, heard, capsys):
     app(given, standalone_mode=False)
     assert capsys.readouterr().out.rstrip("\n") == heard
 
 
-def test_a_word_with_a_dash_is_still_an_option():
+def test_word_with_a_dash_is_an_option():
     with pytest.raises(Exception, match="No such option"):
         app(["1", "--rmap", "2"], standalone_mode=False)
 
@@ -93,7 +93,7 @@ def test_mode_and_link_are_checked():
     assert common.with_loop(config, None, None) is config
 
 
-def test_a_default_folder_is_a_new_one(tmp_path, monkeypatch):
+def test_default_folder_is_new(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     seen = set()
     for _ in range(3):

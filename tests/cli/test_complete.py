@@ -1,4 +1,4 @@
-"""What the shell offers, and that it costs little: nothing heavy is imported for it."""
+"""Shell completion: offered words, and no heavy imports."""
 
 import json
 import os
@@ -13,7 +13,7 @@ from rtctl.machines import CONFIGS
 
 
 def offered(shell: str, line: str, **environment: str) -> list[str]:
-    """What the shell's script would get for a line; bash counts its words, the others give the line."""
+    """Words that the completion script of a shell gets for a command line."""
     words = {"COMP_WORDS": line, "COMP_CWORD": str(len(line.split(" ")) - 1)} if shell == "bash" else {}
     done = subprocess.run(
         [sys.executable, "-c", "import sys; from rtctl.cli.main import main; sys.exit(main([]))"],
@@ -26,16 +26,16 @@ def offered(shell: str, line: str, **environment: str) -> list[str]:
 
 
 @pytest.mark.parametrize("shell", ["bash", "fish"])
-def test_commands_and_options(shell):
+def test_completion_offers_commands_and_options(shell):
     assert [word for word in offered(shell, "rtctl dia") if word.startswith("dia")] == ["diagnose"]
     assert "frf" in offered(shell, "rtctl identify f")
 
 
-def test_zsh_has_the_help_beside():
+def test_zsh_completion_includes_the_help_texts():
     assert "ldu_printer" in " ".join(offered("zsh", "rtctl run ldu_"))
 
 
-def test_configs_references_campaigns(tmp_path, monkeypatch):
+def test_completion_offers_configs_references_and_campaigns(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "bench.yaml").write_text("")
@@ -51,7 +51,7 @@ def test_configs_references_campaigns(tmp_path, monkeypatch):
     assert "radii_10000" in complete.campaigns("")
 
 
-def test_keys_come_from_the_cache(tmp_path, monkeypatch):
+def test_completion_reads_setting_keys_from_the_cache(tmp_path, monkeypatch):
     monkeypatch.setenv("RTCTL_CACHE_DIR", str(tmp_path))
     fresh = complete.keys("law.position.")
     assert {"law.position.gain", "law.position.kind"} <= set(fresh)
@@ -64,7 +64,7 @@ def test_keys_come_from_the_cache(tmp_path, monkeypatch):
     assert complete.keys("law.position.") == fresh
 
 
-def test_keys_are_keys():
+def test_completed_keys_are_the_settings_of_all_machines():
     found = set(complete.words()["keys"])
     assert all("[" not in word for word in found)
     for model in CONFIGS.values():
@@ -72,12 +72,12 @@ def test_keys_are_keys():
     assert "encoder.freeze" in complete.faults("enc") and complete.terms("ripple.e") == ["ripple.encoder"]
 
 
-def test_machines_that_run(monkeypatch):
+def test_completion_offers_running_machines(monkeypatch):
     monkeypatch.setattr("rtctl.cli.common.running", lambda: ["ivu", "ldu"])
     assert complete.machines("l") == ["ldu"]
 
 
-def test_nothing_heavy_is_imported_for_it(tmp_path):
+def test_completion_imports_nothing_heavy(tmp_path):
     complete.words()
     code = """
 import sys

@@ -1,5 +1,5 @@
-"""From a machine with something hidden in it to the opened seal: plant and loop as two processes, the capture
-diagnosed, the model run against it."""
+"""Hidden effect end to end: plant and loop in two processes, diagnosis of the capture, simulation of the model,
+opened seal."""
 
 import os
 import signal
@@ -16,14 +16,14 @@ from rtctl.diagnose.model.simulate import Simulator
 from rtctl.diagnose.record.format1 import load_record
 from rtctl.diagnose.seal import open_seal
 
-AMONG = (  # the library in full takes a minute on the LDU
+AMONG = (  # the full library takes a minute on the LDU
     "friction.stribeck", "friction.coulomb", "friction.viscous", "drive.offset", "drive.deadband", "load.spring",
     "transmission.backlash", "ripple.capstan", "drive.gain_asymmetry",
 )  # fmt: skip
 
 
-def test_what_a_plant_conceals_is_named_by_a_diagnosis_of_its_capture(started, runtime, tmp_path, monkeypatch):
-    """On the reel unit; `rtctl prove` does it on all machines."""
+def test_diagnosis_of_a_capture_names_the_hidden_effect_of_the_plant(started, runtime, tmp_path, monkeypatch):
+    """Reel unit only; `rtctl prove` covers all machines."""
     machine, seed, reference, seconds = "ivu", 2, "steps", 13
     name, seal, folder = f"{machine}{os.getpid()}", tmp_path / "seal.json", tmp_path / "bundle"
     endpoint = f"ipc://{runtime}/{name}.plant"
@@ -51,7 +51,7 @@ def test_what_a_plant_conceals_is_named_by_a_diagnosis_of_its_capture(started, r
 
 
 def _tracked(record):
-    """Rms of what the observer leaves of the main sensor's error in the last three quarters."""
+    """Rms residual of the main sensor under the tracking observer, last three quarters of the record."""
     sim = Simulator(record)
     late = slice(len(record.t) // 4, None)
     return np.sqrt(np.mean((sim.run(nominal(record.case))[late, sim.column(sim.main)] - sim.seen[late]) ** 2))

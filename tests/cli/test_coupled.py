@@ -1,4 +1,4 @@
-"""Machines with mechanics from a file on the command line: new, check, import, and whose code is run."""
+"""Machines with mechanics from a file on the command line: new, check, import, and trusted code."""
 
 import json
 import shutil
@@ -12,21 +12,21 @@ from rtctl.plants.graph import mechanics
 
 
 @pytest.fixture(autouse=True)
-def _nobody_gave_code(runtime, monkeypatch):
-    """As in a process of its own: no file was named yet."""
+def _no_known_mechanics(runtime, monkeypatch):
+    """State of a new process: no mechanics file is known."""
     monkeypatch.setattr(mechanics, "_known", {})
     monkeypatch.setattr(mechanics, "_given", {})
 
 
 @pytest.fixture
 def mine(rtctl, tmp_path):
-    """A machine of one's own, and its file."""
+    """A new machine and its mechanics file."""
     code, _, err = rtctl("new", "machine", "mine.yaml", "--like", "furuta", "--into", tmp_path)
     assert (code, err) == (0, "")
     return tmp_path / "mine.yaml"
 
 
-def test_new_writes_the_file_of_the_mechanics_beside(rtctl, mine):
+def test_new_writes_the_mechanics_file_next_to_the_config(rtctl, mine):
     beside = mine.parent / "furuta.py"
     assert beside.read_text() == (FOLDER / "furuta.py").read_text()
     assert rtctl("new", "machine", "second.yaml", "--like", "furuta", "--into", mine.parent)[0] == 0
@@ -36,7 +36,7 @@ def test_new_writes_the_file_of_the_mechanics_beside(rtctl, mine):
     assert beside.read_text() == "# mine\n" and not (mine.parent / "third.yaml").exists()
 
 
-def test_check_says_what_moves_what(rtctl, mine):
+def test_check_prints_which_drive_moves_which_coordinate(rtctl, mine):
     code, out, err = rtctl("check", mine)
     assert (code, err) == (0, "")
     for words in ("./furuta.py:Furuta moves arm and pendulum by each other", "m 0.024 kg", "2.275 Hz, damping 0.0227"):
@@ -52,7 +52,7 @@ def test_check_says_what_moves_what(rtctl, mine):
     ('COORDINATES = ("arm", "pendulum")', 'COORDINATES = ("arm", "rod")', "there is no body 'rod'"),
     ("import math\n", "import math\n1 / 0\n", "furuta.py:15: ZeroDivisionError"),
 ])  # fmt: skip
-def test_check_tells_the_line_of_a_file_that_does_not_do(rtctl, mine, old, new, words):
+def test_check_reports_the_error_of_an_invalid_mechanics_file(rtctl, mine, old, new, words):
     file = mine.parent / "furuta.py"
     assert old in file.read_text()
     file.write_text(file.read_text().replace(old, new, 1))
@@ -67,15 +67,15 @@ def test_check_tells_the_line_of_a_file_that_does_not_do(rtctl, mine, old, new, 
     ("pendulum: 0 deg", "pendulum: 0 kg", "mechanics.at.pendulum"),
     ("pendulum: 0 deg", "rod: 0 deg", "mechanics.at.rod"),
 ])  # fmt: skip
-def test_check_tells_what_does_not_fit_in_the_config(rtctl, mine, old, new, words):
+def test_check_reports_a_config_that_does_not_fit_the_mechanics(rtctl, mine, old, new, words):
     assert old in mine.read_text()
     mine.write_text(mine.read_text().replace(old, new, 1))
     code, _, err = rtctl("check", mine)
     assert code == 2 and words in err
 
 
-def test_no_code_is_taken_from_a_bundle(rtctl, mine, tmp_path, monkeypatch):
-    """The text in its case is left alone; a path on the command line gives the code."""
+def test_code_from_a_bundle_is_never_run(rtctl, mine, tmp_path, monkeypatch):
+    """Code in the case of a bundle is never run; only a path on the command line names code."""
     log, bundle = tmp_path / "log.csv", tmp_path / "bundle"
     wave = np.round(np.sin(np.arange(1000) * 0.01), 6)
     rows = np.stack([np.arange(1000) * 1e-3, wave, np.floor(100 * wave), np.floor(90 * wave)], axis=1)

@@ -1,4 +1,4 @@
-"""The commands on a described machine: new, check, tune, and mistakes told with file and line."""
+"""Commands on a described machine: new, check, tune, and errors with file and line."""
 
 import pytest
 import yaml
@@ -9,10 +9,10 @@ from rtctl.own.new_like import examples
 
 @pytest.fixture(autouse=True)
 def _runtime(runtime):
-    """Names of sockets are printed, so there must be a folder for them."""
+    """Runtime folder, since socket names are printed."""
 
 
-def test_every_example_begins_a_machine_of_ones_own(rtctl, tmp_path):
+def test_new_machine_can_start_from_every_example(rtctl, tmp_path):
     for like in examples("machine"):
         path = tmp_path / f"my-{like}.yaml"
         code, out, err = rtctl("new", "machine", path.name, "--like", like, "--into", tmp_path)
@@ -26,14 +26,14 @@ def test_every_example_begins_a_machine_of_ones_own(rtctl, tmp_path):
     (["my.yaml"], "my.yaml: there already"), (["other.yaml", "--like", "blet"], "did you mean 'belt'"),
     (["a b"], "a machine's name is letters"),
 ])  # fmt: skip
-def test_new_refuses_in_words(rtctl, tmp_path, words, message):
+def test_new_machine_refuses_existing_files_and_invalid_names(rtctl, tmp_path, words, message):
     (tmp_path / "my.yaml").write_text("")
     code, out, err = rtctl("new", "machine", *words, "--into", tmp_path)
     assert (code, out) == (2, "") and message in err
     assert (tmp_path / "my.yaml").read_text() == ""
 
 
-def test_check_says_and_draws(rtctl, tmp_path):
+def test_check_prints_modes_and_draws_the_machine(rtctl, tmp_path):
     code, out, err = rtctl("check", "belt", "--svg", tmp_path / "belt.svg")
     assert (code, err) == (0, "") and out.startswith("ok\n")
     for words in ("belt (described)", "130.4 Hz, damping 0.18", "8 of 9 parameters", "only together: motor.inertia"):
@@ -64,12 +64,12 @@ def test_tune_writes_a_law_that_loads(rtctl, tmp_path):
     ("driver.kind=comedi", "'comedi' is not one of emulated"),
     ("plant.kind=./mine.py:Mine", "is its own plant"),
 ])  # fmt: skip
-def test_mistakes_are_told(rtctl, key, message):
+def test_check_reports_mistakes_in_a_described_machine(rtctl, key, message):
     code, out, err = rtctl("check", "belt", "--set", key)
     assert (code, out) == (2, "") and message in err
 
 
-def test_effects_are_not_hidden_in_a_described_machine_yet(rtctl, tmp_path):
+def test_described_machine_does_not_support_hidden_effects(rtctl, tmp_path):
     code, _, err = rtctl("plant", "belt", "--conceal", "3", "--seal", tmp_path / "seal.json")
     assert code == 2 and "effects are hidden in machines that come with the program" in err
 

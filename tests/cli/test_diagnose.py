@@ -1,4 +1,4 @@
-"""Diagnoses from the command line: of one bundle, of many, of a machine."""
+"""`rtctl diagnose` on one bundle, on several bundles and on a machine."""
 
 import json
 import os
@@ -41,7 +41,7 @@ SPRING = TERMS["load.spring"].settings(term="load.spring", node="carriage", k=60
 
 
 def record_into(folder, n=5000):
-    """A bundle of an axis with a spring that its owner does not know of."""
+    """A bundle of an axis with a spring that the nominal model lacks."""
     folder.mkdir(parents=True)
     case = read_case(CASE, folder)
     t, zero = np.arange(n) * 1e-3, np.zeros(n)
@@ -55,7 +55,7 @@ def record_into(folder, n=5000):
 
 @pytest.fixture(scope="module")
 def bundle(tmp_path_factory):
-    """Diagnosed once, its results in the bundle."""
+    """Bundle with the files of one diagnosis."""
     folder = record_into(tmp_path_factory.mktemp("many") / "axis")
     with pytest.MonkeyPatch.context() as patch:
         only(patch, "load.spring", "structure.stiffening", "drive.offset", "friction.coulomb")
@@ -63,7 +63,7 @@ def bundle(tmp_path_factory):
     return folder
 
 
-def test_what_is_written(bundle):
+def test_diagnose_writes_result_model_and_report(bundle):
     found = json.loads((bundle / "diagnosis" / "diagnosis.json").read_text())
     assert "load.spring" in {e["name"] for e in found["effects"]}
     assert found["verdict"] in ("named", "ambiguous")
@@ -73,7 +73,7 @@ def test_what_is_written(bundle):
     assert "<html" in page and "src=" not in page
 
 
-def test_the_model_does_better_than_the_owners_belief(rtctl, bundle):
+def test_diagnosed_model_has_a_lower_nrmse_than_the_nominal_model(rtctl, bundle):
     nrmse = [
         json.loads(rtctl("simulate", model, bundle, "--json").out)["nrmse"]["x"]
         for model in (bundle / "diagnosis" / "model.yaml", "case")
@@ -81,7 +81,7 @@ def test_the_model_does_better_than_the_owners_belief(rtctl, bundle):
     assert nrmse[0] < 0.2 * nrmse[1]
 
 
-def test_json_is_all_of_standard_output(rtctl, bundle, tmp_path, monkeypatch):
+def test_json_is_the_only_standard_output(rtctl, bundle, tmp_path, monkeypatch):
     only(monkeypatch, "load.spring")
     code, out, _ = rtctl("diagnose", bundle, "--json", "--no-report", "--out", tmp_path)
     found = json.loads(out)
@@ -91,7 +91,7 @@ def test_json_is_all_of_standard_output(rtctl, bundle, tmp_path, monkeypatch):
     assert {p.name for p in tmp_path.iterdir()} == {"diagnosis.json", "model.yaml"}
 
 
-def test_many_go_on_where_one_is_broken(rtctl, bundle, tmp_path):
+def test_diagnosis_of_several_bundles_continues_after_a_broken_one(rtctl, bundle, tmp_path):
     many = bundle.parent
     folder = tmp_path / "many"
     shutil.copytree(many, folder)
@@ -114,7 +114,7 @@ def test_many_go_on_where_one_is_broken(rtctl, bundle, tmp_path):
     assert found["axis"]["skipped"] and found["short"]["exit_code"] == 3
 
 
-def test_no_verdict_alone_is_3(rtctl, bundle, tmp_path):
+def test_bundle_without_a_verdict_is_exit_code_3(rtctl, bundle, tmp_path):
     (tmp_path / "a").mkdir()
     save_case(tmp_path / "a", CASE)
     pq.write_table(pq.read_table(bundle / "recording.parquet").slice(0, 400), tmp_path / "a" / "recording.parquet")
@@ -134,14 +134,14 @@ def test_no_verdict_alone_is_3(rtctl, bundle, tmp_path):
         (["nomachine", "--closed-loop"], "nomachine"),
     ],
 )
-def test_mistakes(rtctl, tmp_path, monkeypatch, words, message):
+def test_invalid_arguments_are_exit_code_2(rtctl, tmp_path, monkeypatch, words, message):
     monkeypatch.chdir(tmp_path)
     code, out, err = rtctl("diagnose", *words)
     assert code == 2 and message in err and out == ""
 
 
-def test_a_machine_that_is_recorded_and_diagnosed(rtctl, tmp_path, monkeypatch):
-    """What is shown of it; what is done is the business of `repair`."""
+def test_closed_loop_diagnosis_records_and_prints_its_changes(rtctl, tmp_path, monkeypatch):
+    """Output of the closed-loop diagnosis; `repair` is replaced by a stub."""
     from rtctl.diagnose.answer import files, repair
 
     seen = {}
@@ -163,13 +163,13 @@ def test_a_machine_that_is_recorded_and_diagnosed(rtctl, tmp_path, monkeypatch):
     assert "recording 3 s" in err and "note: mind this" in err and "note: no report" in err
 
 
-def test_help_is_there(rtctl):
+def test_diagnose_has_a_help_text(rtctl):
     code, out, _ = rtctl("diagnose", "--help")
     assert code == 0 and "--closed-loop" in out
     assert rtctl("prove", "--help").code == 0
 
 
-def test_the_bar_moves_on_and_starts_again_with_another_recording():
+def test_progress_bar_restarts_with_each_recording():
     said = ["recording 25 s", "preflight", "fitting the nominal parameters", "screening 60 hypotheses",
             "fitting a:b", "screening 3 hypotheses beside a:b", "fitting a:b + c:d", "look-alikes of a:b",
             "predicting rows that were not fitted", "writing the results"]  # fmt: skip
@@ -180,7 +180,7 @@ def test_the_bar_moves_on_and_starts_again_with_another_recording():
     assert diagnose_console.onward(0.8, "recording 25 s") == 0.0
 
 
-def test_a_line_of_a_bundle():
+def test_summary_line_of_a_bundle():
     effects = [{"name": "drive.offset", "node": "drive1", "confidence": 0.914}]
     line = diagnose_console.line(Outcome("a", 0, 12.34, {"verdict": "named", "effects": effects}))
     assert line.plain.split() == ["a", "named", "drive.offset", "at", "drive1", "91", "%", "12.3", "s"]
@@ -188,7 +188,7 @@ def test_a_line_of_a_bundle():
     assert failed.plain.split()[:2] == ["[b]", "failed:"]
 
 
-def test_stages_on_a_terminal_leave_nothing_behind():
+def test_stages_are_cleared_from_the_terminal():
     console = diagnose_console.DiagnoseConsole(json=True)
     with Path(os.devnull).open("w") as nowhere:
         console.err = Console(file=nowhere, force_terminal=True)

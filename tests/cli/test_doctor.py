@@ -1,4 +1,4 @@
-"""`rtctl doctor` with a measurement made up, and once with a true one."""
+"""`rtctl doctor` with a stubbed measurement, and once with a true one."""
 
 import json
 
@@ -12,7 +12,7 @@ from rtctl.loop import histogram
 
 @pytest.fixture
 def asked(monkeypatch):
-    """What was to be measured; nothing sleeps. At 10 kHz two ticks of 1000 are late, at all other rates one."""
+    """Arguments of a stubbed measurement. At 10 kHz two ticks of 1000 are late, at other rates one."""
     calls = []
 
     def measure(rates, seconds, cpu, priority, fifo, lock, say):
@@ -29,7 +29,7 @@ def asked(monkeypatch):
     return calls
 
 
-def test_says_what_this_machine_can_hold(rtctl, asked):
+def test_doctor_prints_the_rates_this_machine_can_hold(rtctl, asked):
     code, out, err = rtctl("doctor")
     words = " ".join(out.split())
     assert (code, err) == (0, "")
@@ -38,7 +38,7 @@ def test_says_what_this_machine_can_hold(rtctl, asked):
     assert asked[0][:2] == ([500.0, 10_000.0], 5)
 
 
-def test_as_json(rtctl, asked):
+def test_doctor_as_json(rtctl, asked):
     code, out, _ = rtctl("doctor", "--json", "--seconds", 3, "--rate", 2000)
     found = json.loads(out)
     assert code == 0
@@ -49,14 +49,14 @@ def test_as_json(rtctl, asked):
 
 
 @pytest.mark.parametrize(("need", "code"), [(500, 0), (3000, 0), (10_000, 1)])
-def test_a_rate_that_is_needed(rtctl, asked, need, code):
+def test_needed_rate_sets_the_exit_code(rtctl, asked, need, code):
     said = rtctl("doctor", "--json", "--need", need)
     assert said.code == code
     assert json.loads(said.out)["need"] == {"rate_hz": float(need), "held": code == 0}
     assert float(need) in asked[0][0]
 
 
-def test_a_bad_machine_is_no_error(rtctl, asked, monkeypatch):
+def test_unsuitable_machine_is_not_an_error(rtctl, asked, monkeypatch):
     monkeypatch.setattr(rights, "may_fifo", lambda priority: False)
     code, out, _ = rtctl("doctor", "--json")
     found = json.loads(out)
@@ -64,20 +64,20 @@ def test_a_bad_machine_is_no_error(rtctl, asked, monkeypatch):
     assert found["facts"][0]["verdict"] == "bad"
 
 
-def test_a_machine_that_runs_beside_it_is_told(rtctl, asked, monkeypatch):
+def test_running_machines_are_noted(rtctl, asked, monkeypatch):
     monkeypatch.setattr("rtctl.cli.common.running", lambda: ["ivu", "ldu"])
     assert "not alone: ivu, ldu runs here" in json.loads(rtctl("doctor", "--json").out)["measured"]["lacks"][0]
     assert "note: not alone" in rtctl("doctor").out
 
 
-def test_only_looks(rtctl, asked):
+def test_no_measure_skips_the_measurement(rtctl, asked):
     code, out, _ = rtctl("doctor", "--no-measure", "--json")
     found = json.loads(out)
     assert (code, found["measured"], asked) == (0, None, [])
     assert "hold" not in rtctl("doctor", "--no-measure").out
 
 
-def test_draws(rtctl, asked, tmp_path):
+def test_plot_writes_a_picture(rtctl, asked, tmp_path):
     assert rtctl("doctor", "--plot", tmp_path / "a.png").code == 0
     assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
 
@@ -96,14 +96,14 @@ def test_draws(rtctl, asked, tmp_path):
         (("--seconds", 0), "--seconds"),
     ],
 )
-def test_mistakes(rtctl, asked, arguments, words):
+def test_invalid_arguments_are_exit_code_2(rtctl, asked, arguments, words):
     code, out, err = rtctl("doctor", *arguments)
     assert (code, out, asked) == (2, "", [])
     assert words in err
 
 
 @pytest.mark.realtime
-def test_a_true_measurement(rtctl):
+def test_doctor_with_a_true_measurement(rtctl):
     code, out, err = rtctl("doctor", "--json", "--seconds", 1, "--rate", 100)
     assert (code, err) == (0, "")
     measured = json.loads(out)["measured"]

@@ -1,4 +1,4 @@
-"""`rtctl fault`: the catalogue, a machine that has faults, and mistakes."""
+"""`rtctl fault`: the catalogue, faults of a running machine, and error messages."""
 
 import json
 from collections.abc import Callable
@@ -9,7 +9,7 @@ import pytest
 from rtctl.tick.faults import KINDS
 
 
-def test_the_catalogue_says_what_each_is(rtctl: Callable[..., Any]) -> None:
+def test_fault_catalogue_lists_every_fault_with_its_unit(rtctl: Callable[..., Any]) -> None:
     said = rtctl("fault", "list", "--catalogue")
     assert said.code == 0
     assert [line.split()[0] for line in said.out.splitlines()] == list(KINDS)
@@ -28,13 +28,13 @@ def test_the_catalogue_says_what_each_is(rtctl: Callable[..., Any]) -> None:
         (("table", "--markdown", "/nowhere/faults.md"), "there is no folder /nowhere"),
     ],
 )
-def test_mistakes_are_told(rtctl: Callable[..., Any], words: tuple[str, ...], message: str) -> None:
+def test_invalid_fault_is_an_error(rtctl: Callable[..., Any], words: tuple[str, ...], message: str) -> None:
     said = rtctl("fault", *words)
     assert said.code == 2 and message in said.err
 
 
 @pytest.mark.realtime
-def test_a_running_machine_has_faults_added_listed_and_cleared(rtctl: Callable[..., Any], machine: str) -> None:
+def test_faults_of_a_running_machine_are_added_listed_and_cleared(rtctl: Callable[..., Any], machine: str) -> None:
     added = rtctl("fault", "add", "link.delay", "--at", "100s", "--for", "2s", "--size", "20ms", "--name", machine)
     assert added.code == 0 and added.out.startswith("link.delay, size 10: tick ")
     found = json.loads(rtctl("fault", "list", "--name", machine, "--json").out)["faults"]

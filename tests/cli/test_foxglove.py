@@ -1,4 +1,4 @@
-"""`rtctl foxglove`: what it refuses, and the layouts that come with it."""
+"""`rtctl foxglove`: refused arguments, and the shipped layouts."""
 
 import json
 import re
@@ -13,19 +13,19 @@ ROOT = Path(__file__).parents[2]
 EXTREMES = {"ivu": False, "ldu": True}  # 10 kHz is thinned
 
 
-def test_control_is_for_this_machine_alone(rtctl, runtime):
+def test_control_is_refused_on_a_network_address(rtctl, runtime):
     code, _, err = rtctl("foxglove", "--host", "0.0.0.0", "--control")
     assert code == 2
     assert "only 127.0.0.1 may be opened with it" in err
 
 
-def test_nobody_runs(rtctl, runtime):
+def test_foxglove_without_a_running_machine_is_an_error(rtctl, runtime):
     code, _, err = rtctl("foxglove", "nobody")
     assert code == 2
     assert "no machine 'nobody' runs here" in err
 
 
-def test_without_the_package(rtctl, runtime, served, config, monkeypatch):
+def test_foxglove_without_its_package_is_an_error(rtctl, runtime, served, config, monkeypatch):
     machine = served(config("ivu"))
     monkeypatch.setitem(sys.modules, "foxglove", None)
     for name in [name for name in sys.modules if name.startswith("rtctl.foxglove")]:

@@ -1,4 +1,4 @@
-"""A terminal that is closed ends the run: disarmed, recorded to its end. And a run that lost something says so."""
+"""A closed terminal ends the run: disarmed and fully recorded. A run with losses reports them."""
 
 import fcntl
 import json
@@ -25,7 +25,7 @@ def _at_a_terminal() -> None:
 
 
 @pytest.mark.realtime
-def test_a_closed_terminal_disarms_and_ends_the_recording(runtime: Path, tmp_path: Path) -> None:
+def test_closed_terminal_disarms_and_ends_the_recording(runtime: Path, tmp_path: Path) -> None:
     master, slave = pty.openpty()
     out = tmp_path / "run"
     sets = ["--set", f"name=hup{os.getpid()}", "--set", "loop.realtime=off", "--set", "safety.missed_ticks=0"]
@@ -43,16 +43,16 @@ def test_a_closed_terminal_disarms_and_ends_the_recording(runtime: Path, tmp_pat
             shown += os.read(master, 65536)
         except BlockingIOError:
             time.sleep(0.02)
-    os.close(master)  # the kernel sends SIGHUP to the session, and writing fails from now on
+    os.close(master)  # the kernel sends SIGHUP to the session; writes to the terminal fail
     run.wait(60)
     assert run.returncode == 129
     trace = load_bundle(out)
     ticks = trace.columns["tick"]
     assert not trace.case["run"]["trip"] and (trace.columns["state"] == 2).any()
-    assert trace.case["run"]["ticks"] == len(ticks) == ticks[-1] + 1  # to the very last, which sends zero
+    assert trace.case["run"]["ticks"] == len(ticks) == ticks[-1] + 1  # including the last tick, which sends zero
 
 
-def test_what_was_missed_is_told_beside_the_steps_and_is_the_exit_code_if_asked(tmp_path: Path) -> None:
+def test_missed_ticks_are_reported_and_fail_on_loss_sets_the_exit_code(tmp_path: Path) -> None:
     fault = "faults=[{fault: loop.stall, at: 0.5, lasts: 2 ms, size: 0.006}]"
     words = [*RUN, "--mode", "fused", "--for", "1s", "--set", fault, "--set", f"name=loss{os.getpid()}"]
     plain = subprocess.run([*words, "--out", tmp_path / "a"], capture_output=True, text=True, check=False)

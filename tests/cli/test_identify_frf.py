@@ -12,7 +12,7 @@ SHORT = ["--averages", "8", "--rms", "1V"]
 
 @pytest.fixture(scope="module")
 def bundles(tmp_path_factory):
-    """Two realisations, recorded as a daemon does."""
+    """Bundles of two realisations."""
     from rtctl.cli import identify_source
     from rtctl.cli.common import load_config
     from rtctl.identify import experiment
@@ -24,7 +24,7 @@ def bundles(tmp_path_factory):
     return [str(path) for path in sorted(out.iterdir())]
 
 
-def test_the_sensitivity_of_an_emulated_machine(rtctl, tmp_path):
+def test_identify_frf_of_an_emulated_machine(rtctl, tmp_path):
     picture = tmp_path / "frf.png"
     code, out, err = rtctl("identify", "frf", "ivu", *SHORT, "--plot", picture)
     assert code == 0
@@ -33,7 +33,7 @@ def test_the_sensitivity_of_an_emulated_machine(rtctl, tmp_path):
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
-def test_as_json_per_ampere(rtctl):
+def test_frf_per_ampere_as_json(rtctl):
     code, out, err = rtctl("identify", "frf", "ivu", *SHORT, "--per-ampere", "--json")
     found = json.loads(out)
     assert code == 0 and err == ""
@@ -41,7 +41,7 @@ def test_as_json_per_ampere(rtctl):
     assert len(found["f"]) == len(found["coherence"]) == len(found["S"]["re"])
 
 
-def test_realisations_from_recordings(rtctl, bundles):
+def test_multisine_frf_from_recorded_realisations(rtctl, bundles):
     code, out, _ = rtctl("identify", "multisine", *bundles)
     assert code == 0
     assert out.startswith("2 realisations of 4 periods")
@@ -49,7 +49,7 @@ def test_realisations_from_recordings(rtctl, bundles):
     assert json.loads(out)["frf"]["motor"] == 1
 
 
-def test_a_fit_from_recordings(rtctl, bundles):
+def test_fit_from_recordings(rtctl, bundles):
     code, out, _ = rtctl("identify", "fit", *bundles, "--json")
     found = json.loads(out)["parameters"]
     assert code == 0
@@ -59,7 +59,7 @@ def test_a_fit_from_recordings(rtctl, bundles):
     assert code == 0 and "95 % from" in out
 
 
-def test_data_that_carry_no_answer(rtctl, bundles):
+def test_insufficient_data_is_exit_code_3(rtctl, bundles):
     code, out, err = rtctl("identify", "multisine", bundles[0])
     assert (code, out) == (3, "") and "at least two" in err
     code, out, err = rtctl("identify", "frf", "ivu", *SHORT, "--band", "1:200")
@@ -77,18 +77,18 @@ def test_data_that_carry_no_answer(rtctl, bundles):
         (["frf", "ivu", "ldu"], "is not a folder"),
     ],
 )
-def test_mistakes(rtctl, arguments, said):
+def test_invalid_arguments_are_refused(rtctl, arguments, said):
     code, out, err = rtctl("identify", *arguments)
     assert (code, out) == (2, "")
     assert said in err
 
 
-def test_options_of_a_config_do_not_go_with_recordings(rtctl, bundles):
+def test_config_options_are_refused_with_recordings(rtctl, bundles):
     code, _, err = rtctl("identify", "multisine", *bundles, "--set", "loop.seed=2")
     assert code == 2 and "goes with a CONFIG" in err
 
 
-def test_help_loads_nothing_heavy():
+def test_help_imports_nothing_heavy():
     code = (
         "import sys; from rtctl.cli import main; "
         "main.main(['identify', 'fit', '--help']); print('numpy' in sys.modules, 'numba' in sys.modules)"

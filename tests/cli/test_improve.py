@@ -1,4 +1,4 @@
-"""`rtctl improve`: a better config and a report, or a sentence that says why not."""
+"""`rtctl improve`: an improved config and a report, or an error message."""
 
 import json
 
@@ -27,7 +27,7 @@ def model(tmp_path):
     return path
 
 
-def test_a_model_becomes_a_better_config_with_a_report(model, tmp_path):
+def test_improve_writes_a_better_config_and_a_report(model, tmp_path):
     config = common.load_config(str(model), [])
     from rtctl.config.load import set_paths
 
@@ -51,19 +51,19 @@ def test_a_model_becomes_a_better_config_with_a_report(model, tmp_path):
     (["--config", "ivu"], "is of another kind of machine"),
     (["--reference", "nowhere.yaml"], "nowhere"),
 ])  # fmt: skip
-def test_mistakes_are_told(words, match, model, tmp_path):
+def test_invalid_arguments_are_refused(words, match, model, tmp_path):
     with pytest.raises(UserError, match=match):
         run(model, *words)
     assert not list(tmp_path.glob("better*"))
 
 
-def test_files_are_not_written_over(model, tmp_path):
+def test_existing_files_are_not_overwritten(model, tmp_path):
     (tmp_path / "better.yaml").write_text("mine")
     with pytest.raises(UserError, match="exists; give another name, or --force"):
         run(model, "--out", tmp_path / "better.yaml")
     assert (tmp_path / "better.yaml").read_text() == "mine"
 
 
-def test_a_body_that_there_is_not_is_told(model, tmp_path):
+def test_unknown_body_is_refused(model, tmp_path):
     with pytest.raises(UserError, match="--body arm: the machine has motor, carriage"):
         run(model, "--body", "arm", "--out", tmp_path / "better.yaml")

@@ -1,4 +1,4 @@
-"""A daemon in real time, and every command that speaks to one."""
+"""A daemon in real mode, and every command that talks to a daemon."""
 
 import json
 
@@ -11,7 +11,7 @@ from rtctl.trace.bundle import load_bundle
 
 @pytest.fixture(autouse=True)
 def _idle(machine, capsys):
-    """Outputs are off where a test starts."""
+    """Outputs are off at the start of a test."""
     assert main(["disarm"]) == 0
     assert main(["reset"]) == 0
 
@@ -36,7 +36,7 @@ def interrupt_after(monkeypatch, module, count):
     monkeypatch.setattr(module.time, "sleep", sleep)
 
 
-def test_status(rtctl, machine):
+def test_status_prints_the_running_machine(rtctl, machine):
     code, out, err = rtctl("status")
     assert (code, err) == (0, "")
     for text in (
@@ -62,7 +62,7 @@ def test_status_as_json(rtctl, machine):
     assert set(then["signals"]) > {"capstan", "u1", "tension1_estimate"}
 
 
-def test_status_until_interrupted(rtctl, machine, monkeypatch):
+def test_status_repeats_until_interrupted(rtctl, machine, monkeypatch):
     interrupt_after(monkeypatch, status, 2)
     code, out, _ = rtctl("status", "--watch", "--json")
     assert code == 0
@@ -75,15 +75,15 @@ def test_status_until_interrupted(rtctl, machine, monkeypatch):
     assert machine in out
 
 
-def test_arm_play_disarm(rtctl, machine, armed):
+def test_arm_play_and_disarm(rtctl, machine, armed):
     while json.loads(rtctl("status", "--json").out)["state"] != "running":
-        pass  # the tape is being tightened
+        pass  # the tape is tightened first
     assert rtctl("play") == (0, f"{machine} is running\n", "")
     said = json.loads(rtctl("disarm", "--json").out)
     assert (said["name"], said["state"], said["trip"]) == (machine, "idle", None)
 
 
-def test_setpoint_needs_outputs(rtctl):
+def test_setpoint_without_outputs_is_refused(rtctl):
     assert rtctl("setpoint", "1") == (2, "", "rtctl: outputs are off; `rtctl arm` first\n")
 
 
@@ -99,7 +99,7 @@ def test_setpoint_needs_outputs(rtctl):
         (["2.5", "--unit", "mm", "--ramp", "25"], 0.2, 2.0),
     ],
 )
-def test_setpoint(rtctl, armed, words, target, rate):
+def test_setpoint_prints_its_target(rtctl, armed, words, target, rate):
     code, out, err = rtctl("setpoint", "--json", *words)
     assert (code, err) == (0, "")
     result = json.loads(out)
@@ -108,7 +108,7 @@ def test_setpoint(rtctl, armed, words, target, rate):
 
 
 def test_setpoint_moves_the_machine(rtctl, armed, tmp_path):
-    code, out, _ = rtctl("setpoint", "1", "--ramp", "1rad/s")  # further than any other test goes
+    code, out, _ = rtctl("setpoint", "1", "--ramp", "1rad/s")  # further than in any other test
     assert code == 0
     assert out.startswith("to 1 rad at 1 rad/s, from tick")
     assert rtctl("capture", "--for", "20ms", "--trigger", "capstan > 0.9", "-o", tmp_path / "c").code == 0
@@ -128,13 +128,13 @@ def test_setpoint_moves_the_machine(rtctl, armed, tmp_path):
         (["1e999"], "finite"),
     ],
 )
-def test_setpoints_that_make_no_sense(rtctl, armed, words, message):
+def test_invalid_setpoint_is_refused(rtctl, armed, words, message):
     code, out, err = rtctl("setpoint", *words)
     assert (code, out) == (2, "")
     assert message in err
 
 
-def test_get_and_set(rtctl):
+def test_get_and_set_a_setting(rtctl):
     assert rtctl("set", "law.position.gain", "25").code == 0
     assert rtctl("get", "law.position.gain").out == "25.0\n"
     assert rtctl("set", "law.position.tau_d", "180 ms").code == 0
@@ -162,7 +162,7 @@ def test_get_and_set(rtctl):
         (["set", "name", "other"], "cannot change while the machine runs"),
     ],
 )
-def test_settings_that_cannot_be(rtctl, words, message):
+def test_invalid_or_fixed_setting_is_refused(rtctl, words, message):
     code, out, err = rtctl(*words)
     assert (code, out) == (2, "")
     assert message in err
@@ -189,7 +189,7 @@ def test_capture_without_waiting(rtctl, tmp_path):
     assert (found["done"], found["bundle"]) == (False, str(tmp_path / "c"))
 
 
-def test_ctrl_c_ends_a_capture_and_keeps_it(rtctl, tmp_path, monkeypatch):
+def test_ctrl_c_ends_a_capture_and_keeps_its_rows(rtctl, tmp_path, monkeypatch):
     interrupt_after(monkeypatch, capture, 1)
     folder = tmp_path / "capture"
     code, out, err = rtctl("capture", "--for", "1s", "--trigger", "tick < 0", "-o", folder)
@@ -209,13 +209,13 @@ def test_ctrl_c_ends_a_capture_and_keeps_it(rtctl, tmp_path, monkeypatch):
         (["--for", "1s", "-o", "/proc/nothing"], "/proc/nothing"),
     ],
 )
-def test_captures_that_cannot_be(rtctl, words, message):
+def test_invalid_capture_is_refused(rtctl, words, message):
     code, out, err = rtctl("capture", *words)
     assert (code, out) == (2, "")
     assert message in err
 
 
-def test_a_folder_that_holds_a_recording_is_left_alone(rtctl, tmp_path):
+def test_folder_with_a_recording_is_not_overwritten(rtctl, tmp_path):
     folder = tmp_path / "c"
     assert rtctl("capture", "--for", "20ms", "-o", folder).code == 0
     code, _, err = rtctl("capture", "--for", "20ms", "-o", folder)
@@ -223,14 +223,14 @@ def test_a_folder_that_holds_a_recording_is_left_alone(rtctl, tmp_path):
     assert "already holds" in err
 
 
-def test_one_daemon_a_name(rtctl, machine, tmp_path):
+def test_second_daemon_of_a_name_is_refused(rtctl, machine, tmp_path):
     words = ["--mode", "real", "--link", "shm", "--for", "1s", "--out", tmp_path / "b"]
     code, _, err = rtctl("run", "ivu", "--set", f"name={machine}", *words)
     assert code == 2
     assert f"'{machine}' is run by another daemon (pid" in err
 
 
-def test_an_endpoint_that_is_taken(rtctl, machine, runtime, tmp_path):
+def test_endpoint_in_use_is_an_error(rtctl, machine, runtime, tmp_path):
     words = ["--mode", "real", "--link", "shm", "--for", "1s", "--out", tmp_path / "b"]
     taken = f"commands.endpoint=ipc://{runtime}/rtctl/{machine}.command"
     code, _, err = rtctl("run", "ivu", "--set", f"name={machine}b", "--set", taken, *words)
@@ -238,7 +238,7 @@ def test_an_endpoint_that_is_taken(rtctl, machine, runtime, tmp_path):
     assert "in use by another daemon" in err
 
 
-def test_a_name_that_nobody_has(rtctl, machine):
+def test_unknown_machine_name_error_suggests_running_machines(rtctl, machine):
     code, _, err = rtctl("status", "--name", f"{machine}x")
     assert code == 2
     assert f"did you mean '{machine}'" in err
@@ -246,7 +246,7 @@ def test_a_name_that_nobody_has(rtctl, machine):
     assert f"there is {machine}" in err
 
 
-def test_stop_waits_for_the_end_and_the_run_tells_its_story(rtctl, machine, running, tmp_path):
+def test_stop_waits_for_the_end_and_the_run_prints_its_result(rtctl, machine, running, tmp_path):
     other = f"{machine}2"
     with running(other, tmp_path / "bundle") as process:
         code, _, err = rtctl("status")
@@ -262,7 +262,7 @@ def test_stop_waits_for_the_end_and_the_run_tells_its_story(rtctl, machine, runn
     assert rtctl("status").code == 0
 
 
-def test_a_build_after_a_run_has_nothing_to_do(rtctl, machine):
+def test_build_after_a_run_compiles_nothing(rtctl, machine):
     code, out, err = rtctl("build", "ivu", "--mode", "real", "--link", "shm")
     assert (code, err) == (0, "")
     assert out.endswith("cached: run_real, plant_real\n")

@@ -18,7 +18,7 @@ LEAVES = [(c,) for c in COMMANDS if c not in GROUPS] + [(g, c) for g, commands i
 
 
 @pytest.mark.parametrize("command", LEAVES, ids=" ".join)
-def test_every_help_has_examples_that_start_as_the_command_does(rtctl, command):
+def test_every_help_has_examples_that_start_with_the_command(rtctl, command):
     code, out, _ = rtctl(*command, "--help")
     assert code == 0
     assert f"rtctl {' '.join(command)}" in out.split("Examples:")[1]
@@ -31,13 +31,13 @@ def test_help_lists_the_commands_in_order(rtctl):
     assert listed == list(COMMANDS)
 
 
-def test_no_command_shows_the_help(rtctl):
+def test_rtctl_without_a_command_shows_the_help(rtctl):
     code, out, err = rtctl()
     assert (code, err) == (2, "")
     assert "Usage: rtctl" in out
 
 
-def test_version(rtctl):
+def test_version_is_printed(rtctl):
     assert rtctl("--version") == (0, f"rtctl {__version__}\n", "")
 
 
@@ -54,14 +54,14 @@ def test_version(rtctl):
         (["--verbose"], "no such option: --verbose"),
     ],
 )
-def test_mistakes_in_the_words_are_one_line_and_code_2(rtctl, words, message):
+def test_command_line_mistakes_are_one_line_and_exit_code_2(rtctl, words, message):
     code, out, err = rtctl(*words)
     assert (code, out) == (2, "")
     assert err.startswith(f"rtctl: {message}")
     assert err.count("\n") == 1
 
 
-def test_a_mistake_of_ours_is_code_1(rtctl, monkeypatch):
+def test_internal_error_is_exit_code_1(rtctl, monkeypatch):
     def broken(_):
         raise RuntimeError("boom")
 
@@ -71,7 +71,7 @@ def test_a_mistake_of_ours_is_code_1(rtctl, monkeypatch):
     assert err == "rtctl: internal error: RuntimeError('boom'); RTCTL_TRACEBACK=1 shows where\n"
 
 
-def test_interrupt_is_code_130(rtctl, monkeypatch):
+def test_interrupt_is_exit_code_130(rtctl, monkeypatch):
     def interrupted(_):
         raise KeyboardInterrupt
 
@@ -82,7 +82,7 @@ def test_interrupt_is_code_130(rtctl, monkeypatch):
 @pytest.mark.parametrize(
     "words", [["--help"], ["status", "--name", "tcp://127.0.0.1:1"], ["run", "--help"]], ids=" ".join
 )
-def test_starts_without_what_it_does_not_need(words, tmp_path):
+def test_start_imports_nothing_heavy(words, tmp_path):
     program = f"""
 import sys
 from rtctl.cli.main import main
@@ -94,7 +94,7 @@ sys.exit(", ".join(heavy) or 0)
     assert done.returncode == 0, done.stderr
 
 
-def test_a_reader_that_goes_away_is_no_crash():
+def test_closed_output_pipe_is_not_a_crash():
     process = subprocess.Popen(
         [sys.executable, "-m", "rtctl.cli.main", "schema", "ivu"], stdout=subprocess.PIPE, stderr=subprocess.PIPE
     )

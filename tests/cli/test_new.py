@@ -1,4 +1,4 @@
-"""`rtctl new`, and the tutorial that goes on from it."""
+"""`rtctl new`, and the tutorial that starts from its files."""
 
 import re
 import shlex
@@ -16,12 +16,12 @@ pytestmark = pytest.mark.usefixtures("library")
 
 
 def pytest_in(folder, *files):
-    """`pytest` as a person calls it in a folder."""
+    """Run `pytest` in a folder."""
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *files]
     return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=280, check=False)
 
 
-def test_what_it_writes_passes_its_tests_and_is_right(rtctl, tmp_path):
+def test_new_files_pass_their_tests_and_the_checks(rtctl, tmp_path):
     for kind, name, machine in (("law", "Cascade", "axis"), ("plant", "slide", "axis"), ("term", "air_drag", "ivu")):
         code, out, err = rtctl("new", kind, name, "--for", machine, "--into", tmp_path / "new")
         assert (code, err) == (0, "")
@@ -41,7 +41,7 @@ def test_what_it_writes_passes_its_tests_and_is_right(rtctl, tmp_path):
 
 
 @pytest.mark.parametrize("name", ["l_ivu", "a_b_c", "v2_law", "PIController", "my__law", "pd2x", "X", "law_2"])
-def test_any_name_that_it_takes_makes_a_file_that_is_found_again(rtctl, tmp_path, name):
+def test_every_accepted_name_gives_a_config_that_loads(rtctl, tmp_path, name):
     for kind, machine in (("law", "ivu"), ("plant", "axis"), ("term", "ldu")):
         folder = tmp_path / kind
         assert rtctl("new", kind, name, "--for", machine, "--into", folder).code == 0
@@ -49,7 +49,7 @@ def test_any_name_that_it_takes_makes_a_file_that_is_found_again(rtctl, tmp_path
         load_config(str(config), [])
 
 
-def test_it_never_overwrites(rtctl, tmp_path):
+def test_new_never_overwrites(rtctl, tmp_path):
     (tmp_path / "slide.yaml").write_text("mine\n")
     code, _, err = rtctl("new", "law", "slide", "--into", tmp_path)
     assert code == 2
@@ -69,14 +69,14 @@ def test_it_never_overwrites(rtctl, tmp_path):
         (["law", "while"], "'while' is the name of something in Python already"),
     ],
 )
-def test_names_that_do_not_do(rtctl, tmp_path, words, message):
+def test_invalid_name_is_refused(rtctl, tmp_path, words, message):
     code, _, err = rtctl("new", *words, "--into", tmp_path / "none")
     assert code == 2 and message in err
     assert not (tmp_path / "none").exists()
 
 
-def test_the_tutorial(rtctl, tmp_path, monkeypatch):
-    """Its commands, in order, in a folder of their own; console blocks need the wall clock and are left out."""
+def test_tutorial_commands_run(rtctl, tmp_path, monkeypatch):
+    """Runs the commands of the tutorial in order, in a new folder. Console blocks need real time and are skipped."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "200")
     said = {}
@@ -111,7 +111,7 @@ def _largest(bundle):
     return abs(columns["position_error"][columns["state"] == 2]).max()
 
 
-def test_it_tells_the_mistakes_that_the_tutorial_speaks_of(rtctl, tmp_path):
+def test_mistakes_shown_in_the_tutorial_give_the_printed_errors(rtctl, tmp_path):
     rtctl("new", "law", "try_law", "--for", "ldu", "--into", tmp_path)
     file = tmp_path / "try_law.py"
     text = file.read_text()

@@ -10,7 +10,7 @@ from rtctl.plants.physics.portrait import Curve
 
 @pytest.fixture
 def quick(monkeypatch):
-    """Curves that need no compiling; tests/plants/physics/test_portrait.py draws the true ones."""
+    """Stubbed curves that need no compilation; tests/plants/physics/test_portrait.py draws the true curves."""
 
     def draw(term):
         x = np.linspace(0.0, 1.0, 200)
@@ -21,14 +21,14 @@ def quick(monkeypatch):
     monkeypatch.setattr("rtctl.plants.physics.portrait.portrait", draw)
 
 
-def test_lists_every_term(rtctl):
+def test_physics_lists_every_term(rtctl):
     code, out, _ = rtctl("physics")
     assert code == 0
     assert [line.split()[0] for line in out.splitlines()] == list(TERMS)
 
 
 @pytest.mark.parametrize("name", TERMS)
-def test_explains_a_term(rtctl, quick, name):
+def test_physics_explains_a_term(rtctl, quick, name):
     code, out, _ = rtctl("physics", name)
     term, said = TERMS[name], " ".join(out.split())
     assert code == 0
@@ -47,13 +47,13 @@ def test_explains_a_term(rtctl, quick, name):
 
 
 @pytest.mark.parametrize("wrong", ["friction.stribek", "stribeck"])
-def test_an_unknown_term(rtctl, wrong):
+def test_unknown_term_is_an_error(rtctl, wrong):
     code, out, err = rtctl("physics", wrong)
     assert (code, out) == (2, "")
     assert "did you mean 'friction.stribeck'?" in err
 
 
-def test_the_curve_is_the_terms_own(rtctl, tmp_path):
+def test_curve_has_the_axes_and_parameters_of_its_term(rtctl, tmp_path):
     path = tmp_path / "dead.png"
     code, out, _ = rtctl("physics", "drive.deadband", "--plot", path)
     assert code == 0
@@ -61,7 +61,7 @@ def test_the_curve_is_the_terms_own(rtctl, tmp_path):
     assert path.read_bytes().startswith(b"\x89PNG")
 
 
-def test_a_terminal_without_braille_gets_plain_characters():
+def test_terminal_without_braille_gets_ascii_characters():
     code = "import sys; from rtctl.cli.main import main; sys.exit(main(['physics', 'drive.offset']))"
     ascii_only = {"PYTHONIOENCODING": "ascii", "PATH": "/usr/bin:/bin"}
     done = subprocess.run([sys.executable, "-c", code], env=ascii_only, capture_output=True, text=True, check=False)
@@ -72,13 +72,13 @@ def test_a_terminal_without_braille_gets_plain_characters():
 @pytest.mark.parametrize(
     "arguments, said", [(["--plot", "x.png"], "say which"), (["drive.lag", "--plot", "x.pdf"], "name it x.png")]
 )
-def test_a_picture_of_nothing_or_of_another_kind(rtctl, arguments, said):
+def test_plot_without_a_term_or_of_another_format_is_refused(rtctl, arguments, said):
     code, out, err = rtctl("physics", *arguments)
     assert (code, out) == (2, "")
     assert said in err
 
 
-def test_the_list_loads_nothing_heavy():
+def test_physics_list_imports_nothing_heavy():
     code = "import sys; from rtctl.cli.main import main; main(['physics']); print('matplotlib' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1] == "False"

@@ -1,4 +1,4 @@
-"""The emulator by itself, and a loop that drives it over TCP."""
+"""The emulator as a separate process, and a loop that drives the emulator over TCP."""
 
 import json
 import os
@@ -22,13 +22,13 @@ LOOP = [
 
 @pytest.fixture
 def endpoint(runtime):
-    """A loopback port that was free a moment ago."""
+    """Endpoint on a free loopback port."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return f"tcp://127.0.0.1:{probe.getsockname()[1]}"
 
 
-def test_a_loop_drives_a_plant_that_was_there_before(rtctl, started, endpoint, tmp_path):
+def test_loop_drives_an_external_plant(rtctl, started, endpoint, tmp_path):
     name = f"plant{os.getpid()}"
     changes = [word for key in (f"name={name}", f"link.endpoint={endpoint}", *LOOP) for word in ("--set", key)]
     with started("plant", "ivu", "--endpoint", endpoint, "--set", f"name={name}") as plant:
@@ -62,14 +62,14 @@ def test_a_loop_drives_a_plant_that_was_there_before(rtctl, started, endpoint, t
         (["--open-seal", "/no/such/x.json"], "is missing"),
     ],
 )
-def test_plants_that_cannot_be(rtctl, runtime, words, message):
+def test_invalid_plant_is_refused(rtctl, runtime, words, message):
     code, out, err = rtctl("plant", *words)
     assert (code, out) == (2, "")
     assert message in err
 
 
-def test_nobody_learns_what_a_plant_conceals(rtctl, started, runtime, tmp_path):
-    """Two processes in lockstep: the effect is in the plant and in the seal, and nowhere else."""
+def test_hidden_effect_is_in_the_plant_and_the_seal_only(rtctl, started, runtime, tmp_path):
+    """Two processes in lockstep: only the plant and the seal contain the effect."""
     name, seal, folder = f"hidden{os.getpid()}", tmp_path / "seal.json", tmp_path / "bundle"
     endpoint = f"ipc://{runtime}/{name}.plant"
     words = ["--endpoint", endpoint, "--mode", "lockstep", "--conceal", "4", "--seal", str(seal)]
@@ -101,7 +101,7 @@ def test_nobody_learns_what_a_plant_conceals(rtctl, started, runtime, tmp_path):
     assert out.startswith(f"{name} (axis), seed 4, sha256 {digest}: as it was sealed\n- {{term: {entry['term']}, ")
 
 
-def test_a_seal_that_was_changed(rtctl, tmp_path):
+def test_changed_seal_is_detected(rtctl, tmp_path):
     seal = tmp_path / "seal.json"
     close_seal(seal, {"name": "ivu", "plant": "ivu", "seed": 1, "physics": []})
     assert rtctl("plant", "--open-seal", seal).code == 0

@@ -1,4 +1,4 @@
-"""Folders of somebody else: no command writes through a link that lies there, and none reads what a link points to."""
+"""Untrusted folders: no command writes through a symbolic link or reads the target of a link."""
 
 import shutil
 from collections.abc import Callable
@@ -45,7 +45,7 @@ def given(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def call(runtime: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[list[str], Path], int]:
-    """`call(words, folder)`: exit code of a command in that folder; searches and pictures are cut short."""
+    """`call(words, folder)`: exit code of a command in a folder; searches and plots are stubbed."""
     only(monkeypatch, "load.spring")
     for name in ("overlay", "distributions", "along", "png"):
         monkeypatch.setattr(f"rtctl.campaign.figures.{name}", lambda *_: "")
@@ -58,12 +58,12 @@ def call(runtime: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[list[str],
 
 
 def below(folder: Path) -> dict[str, bytes | None]:
-    """Files by their path with what they hold; folders with None."""
+    """Content of files by path; None for folders."""
     return {str(p.relative_to(folder)): None if p.is_dir() else p.read_bytes() for p in sorted(folder.rglob("*"))}
 
 
 @pytest.mark.parametrize("name", WRITERS)
-def test_nothing_is_written_through_a_link(
+def test_no_command_writes_through_a_link_to_a_file(
     call: Callable[..., int], given: Path, tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     plain, planted, victims = (tmp_path / n for n in ("plain", "planted", "victims"))
@@ -101,7 +101,7 @@ def test_nothing_is_written_through_a_link(
         ("campaign", "all/bundles"),
     ],
 )
-def test_nothing_is_written_through_a_link_to_a_folder(
+def test_no_command_writes_through_a_link_to_a_folder(
     call: Callable[..., int],
     given: Path,
     tmp_path: Path,
@@ -144,7 +144,7 @@ READERS = {
     ("name", "file"),
     [*((name, file) for name in READERS for file in (PARQUET, CASE)), ("replay", ORDERS), ("info", ORDERS)],
 )
-def test_what_a_link_in_a_bundle_points_to_is_not_read(
+def test_target_of_a_link_in_a_bundle_is_not_read(
     call: Callable[..., int], given: Path, tmp_path: Path, name: str, file: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     for bundle, source in {"recorded": "recorded", "read": "recorded", "imported": "imported"}.items():

@@ -1,4 +1,4 @@
-"""A curve in characters and as a picture."""
+"""A curve in terminal characters and as a picture."""
 
 from typing import NamedTuple
 
@@ -13,7 +13,7 @@ from rtctl.plants.physics import TERMS
 
 
 class Curve(NamedTuple):
-    """As plants/physics/portrait.py gives it."""
+    """Stub of the curve of plants/physics/portrait.py."""
 
     x: np.ndarray
     y: np.ndarray
@@ -38,7 +38,7 @@ def cells(lines):
 
 
 @pytest.mark.parametrize("braille", [True, False])
-def test_its_size_and_ends(braille):
+def test_drawn_curve_has_the_given_size_and_end_points(braille):
     lines = plot(X**3, braille=braille)
     assert len(lines) == portrait.LINES + 3
     assert max(map(len, lines)) <= 11 + portrait.COLUMNS
@@ -51,20 +51,20 @@ def test_plain_characters_are_ascii():
     assert "\n".join(plot(np.sin(X), braille=False)).isascii()
 
 
-def test_a_rise_goes_up_from_left_to_right():
+def test_rising_curve_goes_up_from_left_to_right():
     inside = cells(plot(X, without=X, braille=False))
     assert inside[-1][0] == "*" and inside[0][-1] == "*"
     assert inside[0][0] == " " and inside[-1][-1] == " "
 
 
-def test_a_jump_hangs_together():
+def test_jump_is_drawn_as_a_connected_line():
     inside = cells(plot(np.sign(X), braille=False))
     column = [line[portrait.COLUMNS // 2] for line in inside]
     other = [line[portrait.COLUMNS // 2 - 1] for line in inside]
     assert all("*" in pair for pair in zip(column, other, strict=True))
 
 
-def test_dots_are_where_the_standard_has_them():
+def test_braille_dots_follow_unicode():
     cell = np.zeros((4, 2), bool)
     assert portrait.character(cell, True) == " "
     cell[0, 0] = cell[3, 1] = True
@@ -79,23 +79,23 @@ def test_dots_are_where_the_standard_has_them():
     offset=st.floats(-1e3, 1e3),
     kind=st.sampled_from([np.sin, np.sign, np.abs, np.zeros_like]),
 )
-def test_any_size_fits(scale, offset, kind):
+def test_curve_of_any_scale_and_offset_fits(scale, offset, kind):
     lines = plot(scale * (kind(X) + offset))
     assert len(lines) == portrait.LINES + 3
     assert all(len(line) <= 11 + portrait.COLUMNS for line in lines[1:-1])
 
 
-def test_sizes_are_told():
+def test_sizes_line_names_node_and_parameters():
     assert portrait.sizes(Curve(X, X, X)) == "drawn at carriage of the axis with B 46"
 
 
-def test_the_picture(tmp_path):
+def test_curve_is_saved_as_a_picture(tmp_path):
     path = tmp_path / "new" / "term.png"
     portrait.picture(Curve(X, np.sin(X), 0 * X), path)
     assert path.read_bytes().startswith(b"\x89PNG")
 
 
-def test_a_picture_that_cannot_be_written(tmp_path):
+def test_unwritable_picture_is_an_error(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(UserError, match=r"term\.png cannot be written"):
         portrait.picture(Curve(X, X, X), tmp_path / "file" / "term.png")

@@ -1,4 +1,4 @@
-"""What the computer refuses has words; `internal error` is for mistakes of the program."""
+"""Refused system calls give an error message; `internal error` is for program errors only."""
 
 import contextlib
 import errno
@@ -33,12 +33,12 @@ FAULTS = (
 
 
 class Refusing:
-    """Of the calls to the system below a folder, the one with number `at` is refused with `number`."""
+    """Audit hook: system call number `at` below a folder fails with errno `number`."""
 
     def __init__(self) -> None:
         self.at, self.number, self.count = -1, 0, 0
         self.folders: tuple[str, ...] = ()
-        sys.addaudithook(self)  # for good: a hook cannot be taken off, but does nothing without a folder
+        sys.addaudithook(self)  # permanent: an audit hook cannot be removed, and does nothing without a folder
 
     def __call__(self, event: str, arguments: tuple) -> None:
         if not self.folders or event not in CALLS or not str(arguments[0]).startswith(self.folders):
@@ -82,7 +82,7 @@ FILLED = {"run": 1, "campaign": 3, "reproduce": 1}  # sizes of a full disk, from
 
 @pytest.fixture(scope="module")
 def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with what the commands read: a log, a bundle imported from it, a recording, a campaign."""
+    """A folder with the inputs of the commands: a log, its imported bundle, a recording, a campaign."""
     folder = tmp_path_factory.mktemp("refused")
     (folder / "matrix.yaml").write_text(small.MATRIX)
     shutil.copy(Path(__file__).parents[2] / "configs" / "axis.yaml", folder)
@@ -96,7 +96,7 @@ def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def command(
     request: pytest.FixtureRequest, runtime: Path, here: Path, monkeypatch: pytest.MonkeyPatch
 ) -> Callable[[Path], int]:
-    """`command(out)` calls the command of this name; searches and pictures, which refuse nothing, are cut short."""
+    """`command(out)` calls the command of this name; searches and plots are stubbed."""
     only(monkeypatch, "load.spring")
     for name in ("overlay", "distributions", "along", "png"):
         monkeypatch.setattr(f"rtctl.campaign.figures.{name}", lambda *_: "")
@@ -104,7 +104,7 @@ def command(
 
 
 @pytest.mark.parametrize("command", COMMANDS, indirect=True)
-def test_every_call_to_the_system_may_be_refused(
+def test_every_refused_system_call_gives_an_error_message(
     command: Callable[[Path], int],
     request: pytest.FixtureRequest,
     here: Path,
@@ -128,13 +128,13 @@ def test_every_call_to_the_system_may_be_refused(
 
 
 @pytest.mark.parametrize("command", [c for c in COMMANDS if c not in ("check", "compare", "replay")], indirect=True)
-def test_a_disk_that_fills_up_has_words(
+def test_full_disk_gives_an_error_message(
     command: Callable[[Path], int],
     request: pytest.FixtureRequest,
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """By the limit on the size of files, which refuses writes of any library as a full disk does."""
+    """A limit on the file size emulates a full disk for every library."""
     name = request.node.callspec.params["command"]
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     codes = []
@@ -161,7 +161,7 @@ def fresh(folder: Path, k: int) -> Path:
     return out
 
 
-def test_a_full_standard_output_has_words() -> None:
+def test_full_standard_output_gives_an_error_message() -> None:
     with Path("/dev/full").open("w") as full:
         done = subprocess.run(
             [sys.executable, "-P", "-m", "rtctl.cli.main", "new", "--help"],

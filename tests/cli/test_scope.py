@@ -9,7 +9,7 @@ from rtctl.daemon.server import CommandServer, default_endpoint
 
 
 class Fine:
-    """A daemon that is asked for its status and its signals."""
+    """Stub of a daemon that answers `status` and `signals`."""
 
     def __init__(self, name):
         self.name = name
@@ -36,7 +36,7 @@ def late(runtime):
 
 
 def answering(server, process):
-    """Answer until the scope has written its next line about it."""
+    """Answer requests until the scope prints its next line; returns the line."""
     poller = zmq.Poller()
     poller.register(server.socket, zmq.POLLIN)
     poller.register(process.stderr.fileno(), zmq.POLLIN)
@@ -46,7 +46,7 @@ def answering(server, process):
     return process.stderr.readline()
 
 
-def test_a_machine_by_its_name_is_waited_for_page_and_all(started, late):
+def test_scope_serves_its_page_while_it_waits_for_a_named_machine(started, late):
     name = f"late{os.getpid()}"
     with started("scope", name, "--port", "0") as process:
         assert process.stdout.readline().startswith(f"{name}, read-only: http://127.0.0.1:")
@@ -56,7 +56,7 @@ def test_a_machine_by_its_name_is_waited_for_page_and_all(started, late):
         assert answering(server, process) == f"{name} answers\n"
 
 
-def test_without_a_name_the_first_that_starts_is_taken(rtctl, runtime, monkeypatch, late):
+def test_scope_without_a_name_takes_the_first_machine_that_starts(rtctl, runtime, monkeypatch, late):
     late("first")
     looks = iter([[], [], ["first"], ["first"]])
     monkeypatch.setattr(common, "running", lambda: next(looks))
@@ -64,14 +64,14 @@ def test_without_a_name_the_first_that_starts_is_taken(rtctl, runtime, monkeypat
     assert scope._name(None) == "first"
 
 
-def test_of_several_one_must_be_named(rtctl, runtime, monkeypatch):
+def test_scope_needs_a_name_when_several_machines_run(rtctl, runtime, monkeypatch):
     monkeypatch.setattr(common, "running", lambda: ["ivu", "ldu"])
     code, out, err = rtctl("scope")
     assert (code, out) == (2, "")
     assert "several machines run: ivu, ldu" in err
 
 
-def test_a_name_that_is_nearly_another_is_doubted(capsys, monkeypatch):
+def test_name_similar_to_a_running_machine_gives_a_hint(capsys, monkeypatch):
     monkeypatch.setattr(common, "running", lambda: ["ivu", "ldu"])
     assert scope._name("iuv") == "iuv"
     assert capsys.readouterr().err == "of other machines there is ivu, ldu; did you mean 'ivu'?\n"
@@ -87,7 +87,7 @@ def test_a_name_that_is_nearly_another_is_doubted(capsys, monkeypatch):
         (["--contorl"], "--contorl"),
     ],
 )
-def test_mistakes_are_one_line(rtctl, runtime, monkeypatch, words, message):
+def test_invalid_arguments_give_one_line(rtctl, runtime, monkeypatch, words, message):
     monkeypatch.setattr(common, "running", lambda: [])
     code, out, err = rtctl("scope", *words)
     assert (code, out) == (2, "")
@@ -95,7 +95,7 @@ def test_mistakes_are_one_line(rtctl, runtime, monkeypatch, words, message):
     assert err.count("\n") == 1
 
 
-def test_watching_waits_for_a_daemon_that_starts(started, late):
+def test_watch_waits_for_a_starting_daemon(started, late):
     name = f"watch{os.getpid()}"
     server = late(name)
     with started("status", "--watch", "--json", "--name", name) as process:

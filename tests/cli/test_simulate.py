@@ -1,4 +1,4 @@
-"""Models against recordings, from the command line."""
+"""`rtctl simulate`: models against recordings."""
 
 import json
 import os
@@ -41,7 +41,7 @@ SPRING = TERMS["load.spring"].settings(term="load.spring", node="carriage", k=80
 
 @pytest.fixture(scope="module")
 def bundle(tmp_path_factory):
-    """A machine with a spring that its owner does not know of."""
+    """Bundle of a machine with a spring that the nominal model lacks."""
     folder = tmp_path_factory.mktemp("bundle")
     case, n = read_case(CASE, folder), 4000
     ref = 0.1 * (1 - np.cos(2 * np.pi * np.arange(n) * 1e-3))
@@ -58,7 +58,7 @@ def model(bundle, tmp_path_factory):
     return write_model(owner_model(record.case).add(SPRING), record, tmp_path_factory.mktemp("model") / "model.yaml")
 
 
-def test_a_rotary_axis_is_told_in_radians_and_newton_metres(rtctl, tmp_path):
+def test_rotary_axis_is_reported_in_radians_and_newton_metres(rtctl, tmp_path):
     t = np.arange(2500) * 1e-3
     u, x = 0.1 * np.sin(2 * np.pi * t), 1 - np.cos(2 * np.pi * t)
     for name, gain in (("a", 1.0), ("b", 1.1)):
@@ -76,7 +76,7 @@ def test_a_rotary_axis_is_told_in_radians_and_newton_metres(rtctl, tmp_path):
     assert "final error [rad]" in lines and "x [rad]" in lines and "[mm]" not in lines
 
 
-def test_the_model_that_has_it_all(rtctl, bundle, model):
+def test_complete_model_reproduces_the_recording(rtctl, bundle, model):
     code, out, err = rtctl("simulate", model, bundle, "--json")
     assert (code, err) == (0, "")
     found = json.loads(out)
@@ -87,7 +87,7 @@ def test_the_model_that_has_it_all(rtctl, bundle, model):
     assert max(found["nrmse"].values()) < 1e-6
 
 
-def test_the_owners_belief_lacks_something(rtctl, bundle, model):
+def test_nominal_model_has_a_larger_rmse_than_the_fitted_model(rtctl, bundle, model):
     fitted, believed = (
         json.loads(rtctl("simulate", name, bundle, "--open-loop", "--json").out)["rmse"] for name in (model, "case")
     )
@@ -95,7 +95,7 @@ def test_the_owners_belief_lacks_something(rtctl, bundle, model):
     assert fitted["x"] < 1e-6 < 1e-3 < believed["x"]
 
 
-def test_a_table_for_people(rtctl, bundle, model):
+def test_simulate_prints_a_table(rtctl, bundle, model):
     code, out, err = rtctl("simulate", model, bundle, "--closed-loop", "--skip", "20")
     assert (code, err) == (0, "")
     lines = out.splitlines()
@@ -105,13 +105,13 @@ def test_a_table_for_people(rtctl, bundle, model):
     assert lines[2].split()[2] == "m"
 
 
-def test_a_plain_config_is_a_model(rtctl, bundle):
+def test_plain_config_is_a_model(rtctl, bundle):
     code, out, _ = rtctl("simulate", "axis", bundle, "--json", "--skip", "20")
     assert code == 0
     assert json.loads(out)["skipped"] == 20
 
 
-def test_a_picture(rtctl, bundle, model, tmp_path):
+def test_simulate_writes_a_picture(rtctl, bundle, model, tmp_path):
     code, _, err = rtctl("simulate", model, bundle, "--plot", tmp_path / "p.png")
     assert (code, err) == (0, "")
     assert (tmp_path / "p.png").read_bytes().startswith(b"\x89PNG")
@@ -119,7 +119,7 @@ def test_a_picture(rtctl, bundle, model, tmp_path):
     assert (code, "cannot be written" in err) == (2, True)
 
 
-def test_a_model_that_runs_away(rtctl, bundle, model, tmp_path):
+def test_diverging_model_is_reported(rtctl, bundle, model, tmp_path):
     data = yaml.safe_load(model.read_text())
     data["plant"]["physics"] = [{"term": "load.spring", "node": "carriage", "k": -1e6}]
     (tmp_path / "m.yaml").write_text(yaml.safe_dump(data))
@@ -139,7 +139,7 @@ def test_a_model_that_runs_away(rtctl, bundle, model, tmp_path):
         (["case"], "missing argument 'BUNDLE'"),
     ],
 )
-def test_what_cannot_be_simulated(rtctl, bundle, words, message):
+def test_invalid_arguments_are_refused(rtctl, bundle, words, message):
     code, out, err = rtctl("simulate", *(word.format(bundle=bundle) for word in words))
     assert (code, out) == (2, "")
     assert message in err
@@ -148,7 +148,7 @@ def test_what_cannot_be_simulated(rtctl, bundle, words, message):
 
 @pytest.fixture
 def changed(bundle, tmp_path):
-    """`changed(**keys)`: the bundle with another case."""
+    """`changed(**keys)`: the bundle with a changed case."""
 
     def make(**keys):
         (tmp_path / "recording.parquet").write_bytes((bundle / "recording.parquet").read_bytes())
@@ -158,7 +158,7 @@ def changed(bundle, tmp_path):
     return make
 
 
-def test_a_law_that_is_not_known(rtctl, changed):
+def test_unknown_law_is_an_error(rtctl, changed):
     folder = changed(controller={"kind": "unknown"}, controller_known=False)
     code, _, err = rtctl("simulate", "case", folder, "--closed-loop")
     assert code == 2
@@ -168,13 +168,13 @@ def test_a_law_that_is_not_known(rtctl, changed):
     assert out.startswith("open loop, 4000 rows")
 
 
-def test_a_belief_without_a_mass(rtctl, changed):
+def test_nominal_model_without_a_mass_is_an_error(rtctl, changed):
     code, _, err = rtctl("simulate", "case", changed(parameters={}))
     assert code == 2
     assert "parameters.M is missing" in err
 
 
-def test_a_real_axis(rtctl):
+def test_real_axis_is_simulated(rtctl):
     folder = SHARED / "data" / "emps"
     if not folder.is_dir():
         pytest.skip("needs the recordings in ../shared")
@@ -184,7 +184,7 @@ def test_a_real_axis(rtctl):
     assert 0 < found["nrmse"]["u"] < 0.2
 
 
-def test_the_loop_is_closed_by_an_own_law_where_its_file_is_given(rtctl, tmp_path, monkeypatch):
+def test_user_law_closes_the_loop_if_its_file_is_given(rtctl, tmp_path, monkeypatch):
     (tmp_path / "my_law.py").write_text((ROOT / "rtctl/own/templates/my_law.py").read_text())
     settings = yaml.safe_load((ROOT / "configs/axis.yaml").read_text())
     settings["law"]["position"] = {"kind": "./my_law.py:MyLaw", "gain": 8000.0, "tau_d": 0.02}
@@ -205,11 +205,13 @@ def test_the_loop_is_closed_by_an_own_law_where_its_file_is_given(rtctl, tmp_pat
     assert re.match(r"closed loop, .*\n.*\nx +0 m +0\nu +0 V +0\n", out)
 
 
-def test_a_described_machine(rtctl, tmp_path):
-    """A rotor that turns as its description says, and one with twice the inertia."""
+def test_described_machine_is_simulated(rtctl, tmp_path):
+    """A rotor with the inertia of its description, and a rotor with twice the inertia."""
     t = np.arange(2000) * 1e-3
     u = np.sin(2 * np.pi * t)
-    x = np.concatenate([[0.0], np.cumsum(1e-3 * np.cumsum(1e-3 * u / 0.01))[:-1]])  # held commands move it a tick later
+    x = np.concatenate(
+        [[0.0], np.cumsum(1e-3 * np.cumsum(1e-3 * u / 0.01))[:-1]]
+    )  # zero-order hold: a command acts one tick later
     machine = {
         "bodies": {"rotor": {"inertia": 0.01}},
         "drives": {"motor": {"body": "rotor", "column": "u", "kind": "force", "gain": 1.0}},

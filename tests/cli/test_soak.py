@@ -1,4 +1,4 @@
-"""`rtctl soak`: exit codes, JSON, JUnit XML, and nothing on a terminal that is none."""
+"""`rtctl soak`: exit codes, JSON, JUnit XML, and no progress output without a terminal."""
 
 import json
 from collections.abc import Callable
@@ -11,7 +11,7 @@ import yaml
 Rtctl = Callable[..., Any]
 
 
-def test_a_short_soak_passes(rtctl: Rtctl, tmp_path: Path) -> None:
+def test_short_soak_passes(rtctl: Rtctl, tmp_path: Path) -> None:
     out, xml = tmp_path / "out", tmp_path / "soak.xml"
     said = rtctl("soak", "ivu", "--hours", 0.01, "--seed", 2, "--out", out, "--junit", xml, "--json")
     assert said.code == 0 and said.err == ""
@@ -23,8 +23,8 @@ def test_a_short_soak_passes(rtctl: Rtctl, tmp_path: Path) -> None:
     assert more.code == 0 and "no violations" in more.out
 
 
-def test_a_law_and_a_plant_of_ones_own(rtctl: Rtctl, tmp_path: Path) -> None:
-    """As `rtctl new` writes them; the plant keeps its speed for itself, so that column is empty."""
+def test_soak_with_user_law_and_user_plant(rtctl: Rtctl, tmp_path: Path) -> None:
+    """Law and plant of `rtctl new`. The plant does not publish its speed, so this column is empty."""
     assert rtctl("new", "law", "pusher", "--for", "axis", "--into", tmp_path).code == 0
     assert rtctl("new", "plant", "slide", "--for", "axis", "--into", tmp_path).code == 0
     plant, config = tmp_path / "slide.py", tmp_path / "slide.yaml"
@@ -59,12 +59,12 @@ def test_violations_are_exit_code_1(rtctl: Rtctl, tmp_path: Path) -> None:
         ((), "--hours"),
     ],
 )
-def test_mistakes_are_exit_code_2(rtctl: Rtctl, options: tuple[str, ...], words: str) -> None:
+def test_invalid_arguments_are_exit_code_2(rtctl: Rtctl, options: tuple[str, ...], words: str) -> None:
     said = rtctl("soak", "ivu", *options)
     assert said.code == 2 and words in said.err and said.err.count("\n") == 1
 
 
-def test_a_folder_that_is_taken(rtctl: Rtctl, tmp_path: Path) -> None:
+def test_folder_of_another_soak_is_refused(rtctl: Rtctl, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     said = rtctl("soak", "ivu", "--hours", 0.01, "--out", tmp_path / "file")
     assert said.code == 2 and "cannot be made" in said.err
@@ -72,7 +72,7 @@ def test_a_folder_that_is_taken(rtctl: Rtctl, tmp_path: Path) -> None:
     assert said.code == 2 and "nothing to resume" in said.err
 
 
-def test_a_damaged_progress_file_is_exit_code_3(rtctl: Rtctl, tmp_path: Path) -> None:
+def test_damaged_progress_file_is_exit_code_3(rtctl: Rtctl, tmp_path: Path) -> None:
     (tmp_path / "progress.npz").write_bytes(b"nothing")
     said = rtctl("soak", "ivu", "--hours", 0.01, "--out", tmp_path, "--resume")
     assert said.code == 3 and "cannot be read" in said.err

@@ -23,7 +23,7 @@ def bundle(tmp_path):
     return folder
 
 
-def test_info(rtctl, bundle):
+def test_trace_info(rtctl, bundle):
     code, out, _ = rtctl("trace", "info", bundle)
     assert code == 0
     assert "tick, t, ref, x" in out
@@ -32,7 +32,7 @@ def test_info(rtctl, bundle):
     assert found["lost_rows"] is None
 
 
-def test_plot(rtctl, bundle, tmp_path):
+def test_trace_plot(rtctl, bundle, tmp_path):
     code, out, _ = rtctl("trace", "plot", bundle, "-o", tmp_path / "picture.png")
     assert (code, out) == (0, f"{tmp_path / 'picture.png'}\n")
     assert (tmp_path / "picture.png").read_bytes().startswith(b"\x89PNG")
@@ -47,7 +47,7 @@ def test_plot(rtctl, bundle, tmp_path):
         ("nowhere/picture.png", "cannot be written (there is no folder"),
     ],
 )
-def test_a_picture_that_cannot_be(rtctl, bundle, tmp_path, name, message):
+def test_invalid_picture_is_refused(rtctl, bundle, tmp_path, name, message):
     for words in (["plot", bundle, "-o", tmp_path / name], ["compare", bundle, bundle, "--plot", tmp_path / name]):
         code, out, err = rtctl("trace", *words)
         assert (code, out) == (2, "")
@@ -55,14 +55,14 @@ def test_a_picture_that_cannot_be(rtctl, bundle, tmp_path, name, message):
     assert [path.name for path in tmp_path.iterdir()] == [bundle.name]
 
 
-def test_repair_of_what_is_whole(rtctl, bundle):
+def test_repair_of_a_complete_bundle_does_nothing(rtctl, bundle):
     code, out, _ = rtctl("trace", "repair", bundle)
     assert code == 0
     assert "nothing to repair, 100 rows" in out
 
 
 @pytest.mark.parametrize("command", ["info", "plot", "repair"])
-def test_what_is_no_bundle(rtctl, command, tmp_path):
+def test_folder_that_is_not_a_bundle_is_an_error(rtctl, command, tmp_path):
     code, out, err = rtctl("trace", command, tmp_path)
     assert (code, out) == (2, "")
     assert str(tmp_path) in err
@@ -70,7 +70,7 @@ def test_what_is_no_bundle(rtctl, command, tmp_path):
 
 @pytest.fixture
 def recorded(bundle):
-    """The same with what a run leaves: its timing, an order, and parts in the case."""
+    """Bundle with the data of a run: timing, an order, and parts in the case."""
     case = json.loads((bundle / "case.json").read_text())
     stage = {"count": 100, "p50": 1.25, "p99": 3.5, "p999": 8.0, "max": 9.0, "buckets": [[1250.0, 100]]}
     case["timing"] = {"read": stage, "wake": {**stage, "count": 0}}
@@ -81,7 +81,7 @@ def recorded(bundle):
     return bundle
 
 
-def test_info_tells_timing_orders_and_parts(rtctl, recorded):
+def test_info_prints_timing_orders_and_parts(rtctl, recorded):
     lines = [line.split() for line in rtctl("trace", "info", recorded).out.splitlines()]
     assert ["timing", "[us]", "p50", "p99", "max", "ticks"] in lines
     assert ["read", "1.25", "3.5", "9", "100"] in lines and not any(line[0] == "wake" for line in lines)
@@ -92,7 +92,7 @@ def test_info_tells_timing_orders_and_parts(rtctl, recorded):
     assert (found["orders"], found["settings_changed"], len(found["parts"])) == (1, ["law.position.gain"], 1)
 
 
-def test_export(rtctl, bundle, tmp_path):
+def test_trace_export(rtctl, bundle, tmp_path):
     assert rtctl("trace", "export", bundle, "--to", "csv") == (0, f"{bundle / 'trace.csv'}\n", "")
     words = ("--columns", "ref, x", "--from", "0s", "--to-time", "500ms", "--every", 10, "--json")
     done = json.loads(rtctl("trace", "export", bundle, "--to", "csv", "-o", tmp_path / "a.csv", *words).out)
@@ -113,12 +113,12 @@ def test_export(rtctl, bundle, tmp_path):
         ([], "missing option '--to'"),
     ],
 )
-def test_export_refuses(rtctl, bundle, words, message):
+def test_invalid_export_is_refused(rtctl, bundle, words, message):
     code, out, err = rtctl("trace", "export", bundle, *words)
     assert (code, out) == (2, "") and message in err and err.count("\n") == 1
 
 
-def test_compare(rtctl, bundle, tmp_path):
+def test_trace_compare(rtctl, bundle, tmp_path):
     other = tmp_path / "other"
     other.mkdir()
     table = pq.read_table(bundle / "recording.parquet")
@@ -137,7 +137,7 @@ def test_compare(rtctl, bundle, tmp_path):
     assert rtctl("trace", "compare", bundle, other, "--align", "eye").code == 2
 
 
-def test_import(rtctl, monkeypatch, tmp_path):
+def test_trace_import(rtctl, monkeypatch, tmp_path):
     monkeypatch.setitem(main.COMMANDS, "import", "import_")
     t = np.arange(3000) * 0.001
     rows = [f"{a!r},{b!r},{c!r}" for a, b, c in zip(t.tolist(), np.cos(t).tolist(), np.sin(t).tolist(), strict=True)]
@@ -154,7 +154,7 @@ def test_import(rtctl, monkeypatch, tmp_path):
     assert code == 2 and "no column 'qmm' (wanted as x); is it 'qm'?" in err
 
 
-def test_import_says_what_a_diagnosis_would_lack(rtctl, monkeypatch, tmp_path):
+def test_import_reports_the_data_that_a_diagnosis_needs(rtctl, monkeypatch, tmp_path):
     monkeypatch.setitem(main.COMMANDS, "import", "import_")
     np.savez(tmp_path / "a.npz", t=np.arange(10) * 0.1, x=np.arange(10.0), u=np.arange(10.0))
     found = json.loads(rtctl("import", tmp_path / "a.npz", "--out", tmp_path / "b", "--plant", "axis", "--json").out)

@@ -1,4 +1,4 @@
-"""`rtctl trend`: its exit codes and its words."""
+"""`rtctl trend`: exit codes and messages."""
 
 import json
 from pathlib import Path
@@ -10,7 +10,7 @@ from rtctl.cli.trend import ALARM
 from tests.trend.bundles import bundle, worn
 
 
-def test_an_alarm_is_an_exit_code_of_its_own(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_alarm_has_a_separate_exit_code(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     worn(tmp_path / "runs", 16, 9)
     assert main(["trend", str(tmp_path / "runs"), "--jobs", "1"]) == ALARM == 4
     text = capsys.readouterr().out
@@ -20,7 +20,9 @@ def test_an_alarm_is_an_exit_code_of_its_own(tmp_path: Path, capsys: pytest.Capt
     assert found["fitted"] == 0 and found["alarms"] == 0 and len(found["changes"]) == 1
 
 
-def test_no_change_is_zero_and_no_bundle_two(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_no_change_is_exit_code_0_and_no_bundle_is_exit_code_2(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     bundle(tmp_path / "runs" / "a", 0)
     assert main(["trend", str(tmp_path / "runs"), "--jobs", "1"]) == 0
     assert "no change" in capsys.readouterr().out

@@ -1,4 +1,4 @@
-"""`rtctl tune`: two files and the reasons, or a sentence that says why not."""
+"""`rtctl tune`: two files and the reasons, or an error message."""
 
 import json
 from pathlib import Path
@@ -35,7 +35,7 @@ def test_json_has_margins_and_reasons(tmp_path):
     assert {reason["path"] for reason in found["reasons"]} == {"law.position.gain", "law.position.tau_d"}
 
 
-def test_files_are_not_written_over(tmp_path):
+def test_existing_files_are_not_overwritten(tmp_path):
     (tmp_path / "tuned.yaml").write_text("mine")
     with pytest.raises(UserError, match=r"tuned\.yaml: exists; give another name, or --force"):
         run("axis", folder=tmp_path)
@@ -50,13 +50,13 @@ def test_files_are_not_written_over(tmp_path):
     (["axis", "--bandwidth", "5000"], "a tenth of the rate"),
     (["axis", "--set", "law.position.gian=1"], "gain"),
 ])  # fmt: skip
-def test_mistakes_are_told(words, match, tmp_path):
+def test_invalid_arguments_are_refused(words, match, tmp_path):
     with pytest.raises(UserError, match=match):
         run(*words, folder=tmp_path)
     assert not list(tmp_path.iterdir())
 
 
-def test_unstable_start_leaves_no_file(tmp_path):
+def test_unstable_start_writes_no_file(tmp_path):
     with pytest.raises(NoAnswer, match="unstable"):
         run("ivu", "--set", "law.position.gain=120", folder=tmp_path)
     assert not list(tmp_path.iterdir())

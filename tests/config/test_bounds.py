@@ -1,4 +1,4 @@
-"""What a running machine may be given: never less safe than its config at the start, or its section `live`."""
+"""Bounds of changes while running: never less safe than the config at the start or its section `live`."""
 
 import math
 import re
@@ -25,9 +25,7 @@ BETTER = [
 
 
 @pytest.mark.parametrize(("path", "value"), WORSE)
-def test_less_safe_than_at_the_start_is_refused_and_the_way_out_is_told(
-    config: Callable[..., Any], path: str, value: Any
-) -> None:
+def test_less_safe_value_is_refused_with_a_remedy(config: Callable[..., Any], path: str, value: Any) -> None:
     start = config("ivu")
     sentence = Bounds(start).crossed(set_path(start, path, value))[path]
     assert path in sentence and "live: {" in sentence and "restart" in sentence
@@ -35,10 +33,10 @@ def test_less_safe_than_at_the_start_is_refused_and_the_way_out_is_told(
 
 @pytest.mark.parametrize("value", [math.nan, math.inf])
 @pytest.mark.parametrize("path", ["safety.following_error", "law.limit.high", "safety.tension_max"])
-def test_what_is_no_number_crosses_every_bound(config: Callable[..., Any], path: str, value: float) -> None:
+def test_nan_and_infinity_cross_every_bound(config: Callable[..., Any], path: str, value: float) -> None:
     start = config("ivu")
     section, name = path.rpartition(".")[::2]
-    parent = get_path(start, section).model_copy(update={name: value})  # past the checks of the settings
+    parent = get_path(start, section).model_copy(update={name: value})  # bypass the validation
     outer, inner = section.rpartition(".")[::2]
     changed = parent if not outer else get_path(start, outer).model_copy(update={inner: parent})
     root = start.model_copy(update={(outer or section): changed})
@@ -48,25 +46,25 @@ def test_what_is_no_number_crosses_every_bound(config: Callable[..., Any], path:
 
 
 @pytest.mark.parametrize("value", ["much", "5 kg", [1], True])
-def test_what_is_no_quantity_is_refused(config: Callable[..., Any], value: Any) -> None:
+def test_invalid_quantity_is_refused(config: Callable[..., Any], value: Any) -> None:
     with pytest.raises(UserError, match=r"safety\.following_error"):
         set_path(config("ivu"), "safety.following_error", value)
 
 
 @pytest.mark.parametrize(("path", "value"), BETTER)
-def test_safer_is_taken_and_the_way_back_is_open(config: Callable[..., Any], path: str, value: Any) -> None:
+def test_safer_value_is_accepted_and_can_be_reverted(config: Callable[..., Any], path: str, value: Any) -> None:
     start = config("ivu")
     bounds = Bounds(start)
     assert bounds.crossed(set_path(start, path, value)) == {}
     assert bounds.crossed(start) == {}
 
 
-def test_a_required_commander_stays_required(config: Callable[..., Any]) -> None:
+def test_required_commander_stays_required(config: Callable[..., Any]) -> None:
     start = config("ivu", set={"safety.require_commander": True})
     assert Bounds(start).crossed(set_path(start, "safety.require_commander", False))
 
 
-def test_the_section_live_widens_one_bound_and_no_other(config: Callable[..., Any]) -> None:
+def test_section_live_widens_only_its_bound(config: Callable[..., Any]) -> None:
     start = config("ivu", set={"live": {"safety.following_error": 1.0}})
     bounds = Bounds(start)
     assert bounds.crossed(set_path(start, "safety.following_error", 1.0)) == {}
@@ -75,13 +73,13 @@ def test_the_section_live_widens_one_bound_and_no_other(config: Callable[..., An
 
 
 @pytest.mark.parametrize("path", ["law.position.gain", "safety.following_eror"])
-def test_live_names_settings_that_have_a_bound(config: Callable[..., Any], path: str) -> None:
+def test_section_live_accepts_only_settings_with_a_bound(config: Callable[..., Any], path: str) -> None:
     with pytest.raises(UserError, match=r"live: .* has no bound"):
         Bounds(config("ivu", set={"live": {path: 1.0}}))
 
 
 @pytest.mark.parametrize("kind", ["ivu", "ldu", "axis"])
-def test_every_limit_of_safety_says_its_safer_direction(config: Callable[..., Any], kind: str) -> None:
+def test_every_safety_limit_declares_its_safer_direction(config: Callable[..., Any], kind: str) -> None:
     settings = config(kind)
     said = {g.path for g in guarded(settings)}
     assert {f"safety.{name}" for name in type(settings.safety).model_fields} <= said

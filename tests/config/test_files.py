@@ -1,4 +1,4 @@
-"""Writers replace a name and never write through it; readers stay in their folder."""
+"""Writers replace a link and never write through it; readers stay in their folder."""
 
 import os
 from pathlib import Path
@@ -9,7 +9,7 @@ from rtctl.config import files
 from rtctl.config.errors import UserError
 
 
-def test_a_link_in_place_of_the_target_is_replaced(tmp_path: Path) -> None:
+def test_link_in_place_of_the_target_is_replaced(tmp_path: Path) -> None:
     victim, target = tmp_path / "victim", tmp_path / "case.json"
     victim.write_text("mine")
     target.symlink_to(victim)
@@ -19,7 +19,7 @@ def test_a_link_in_place_of_the_target_is_replaced(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("append", [0, os.O_APPEND])
-def test_a_stream_refuses_links_and_fifos(tmp_path: Path, append: int) -> None:
+def test_stream_refuses_links_and_fifos(tmp_path: Path, append: int) -> None:
     victim = tmp_path / "victim"
     victim.write_text("mine")
     (tmp_path / "link").symlink_to(victim)
@@ -31,7 +31,7 @@ def test_a_stream_refuses_links_and_fifos(tmp_path: Path, append: int) -> None:
     assert victim.read_text() == "mine"
 
 
-def test_a_reader_refuses_links_out_of_the_folder_and_fifos(tmp_path: Path) -> None:
+def test_reader_refuses_links_out_of_the_folder_and_fifos(tmp_path: Path) -> None:
     folder = tmp_path / "bundle"
     folder.mkdir()
     (tmp_path / "secret").write_text("x")

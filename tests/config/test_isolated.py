@@ -1,4 +1,4 @@
-"""A folder full of traps is the current one: no command imports anything from it, in no process that it starts."""
+"""Import isolation: no command and no child process imports modules from the current folder."""
 
 import json
 import os
@@ -27,12 +27,12 @@ import sys
 from rtctl.cli.main import main
 if __name__ == "__main__":
     sys.exit(main())
-"""  # as pip writes the command
+"""  # entry script as written by pip
 
 
 @pytest.fixture(scope="module")
 def trapped(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with a module of every name that Python or rtctl imports; importing one leaves a file in `ran`."""
+    """A folder with a decoy module for every import of Python and rtctl; an imported decoy leaves a file in `ran`."""
     folder = tmp_path_factory.mktemp("trapped")
     (folder / "ran").mkdir()
     for name in sorted({*sys.stdlib_module_names, *INSTALLED}):
@@ -49,7 +49,7 @@ def trapped(tmp_path_factory: pytest.TempPathFactory) -> Path:
             }
         )
     )
-    for name in ("a", "b"):  # too short: the work is done in a worker, and soon over
+    for name in ("a", "b"):  # short recordings: the workers end soon
         (folder / "bundles" / name).mkdir(parents=True)
         pq.write_table(pa.table({"t": np.arange(9) * 1e-3}), folder / "bundles" / name / PARQUET)
         (folder / "bundles" / name / CASE).write_text(json.dumps({"plant": "axis"}))
@@ -58,9 +58,9 @@ def trapped(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def call(trapped: Path, runtime: Path, tmp_path: Path) -> Callable[..., tuple[int, str]]:
-    """`call("run", "ivu")`: exit code and standard error of the command, started in that folder, with a `rtctl` too.
+    """`call("run", "ivu")`: exit code and stderr of the command, started in the decoy folder with a decoy `rtctl`.
 
-    `module=True` starts it as `python -m rtctl`, without a `rtctl` there.
+    `module=True` starts the command as `python -m rtctl`, without the decoy `rtctl`.
     """
     script = tmp_path / "rtctl"
     script.write_text(SCRIPT)
@@ -85,17 +85,23 @@ def ran(folder: Path) -> list[str]:
     return sorted(path.name for path in (folder / "ran").iterdir())
 
 
-def test_a_pool_of_campaign_runs(call: Callable[..., tuple[int, str]], trapped: Path) -> None:
+def test_campaign_pool_imports_nothing_from_the_current_folder(
+    call: Callable[..., tuple[int, str]], trapped: Path
+) -> None:
     code, said = call("campaign", "run", "matrix.yaml", "--jobs", "2", "--out", "campaign")
     assert (code, ran(trapped)) == (0, []), said
 
 
-def test_workers_of_a_diagnosis(call: Callable[..., tuple[int, str]], trapped: Path) -> None:
+def test_diagnosis_workers_import_nothing_from_the_current_folder(
+    call: Callable[..., tuple[int, str]], trapped: Path
+) -> None:
     code, said = call("diagnose", "bundles", "--jobs", "2", module=True)
     assert (code, ran(trapped)) == (2, []) and "internal error" not in said, said
 
 
-def test_loop_and_plant(call: Callable[..., tuple[int, str]], trapped: Path) -> None:
+def test_loop_and_plant_import_nothing_from_the_current_folder(
+    call: Callable[..., tuple[int, str]], trapped: Path
+) -> None:
     name = f"trapped{os.getpid()}"
     code, said = call(
         "run", "ivu", "--mode", "lockstep", "--for", "0.1s", "--no-plot", "-o", "run", "--set", f"name={name}"

@@ -71,7 +71,7 @@ def complaint(load, text, *overrides):
 
 
 @pytest.mark.parametrize("kind", CONFIGS)
-def test_machines_load_and_round_trip(kind, tmp_path):
+def test_machine_configs_survive_a_round_trip(kind, tmp_path):
     config = load_settings(CONFIG_FOLDER / f"{kind}.yaml", CONFIGS[kind])
     for full in (False, True):
         path = tmp_path / "again.yaml"
@@ -80,12 +80,12 @@ def test_machines_load_and_round_trip(kind, tmp_path):
 
 
 @pytest.mark.parametrize(("kind", "name"), [(kind, name) for kind, names in REFERENCES.items() for name in names])
-def test_references_load(kind, name):
+def test_shipped_references_load(kind, name):
     model = CONFIGS[kind].model_fields["reference"].annotation
     assert load_settings(CONFIG_FOLDER / "references" / f"{name}.yaml", model).steps
 
 
-def test_every_mistake_in_a_machine_is_one_line(tmp_path):
+def test_every_config_mistake_is_one_line(tmp_path):
     text = (CONFIG_FOLDER / "ivu.yaml").read_text()
     path = tmp_path / "ivu.yaml"
     path.write_text(text.replace("rate: 500 Hz", "rate: 500 mm").replace("gain: 31", "gian: 31"))
@@ -123,11 +123,11 @@ def test_every_mistake_in_a_machine_is_one_line(tmp_path):
         ("rate: 5\ncount: 500", "s.yaml: count is more than the rate can carry"),
     ],
 )
-def test_says_what_is_wrong(load, text, message):
+def test_config_error_message(load, text, message):
     assert message in complaint(load, text)
 
 
-def test_a_choice_complains_of_its_own_branch_only(load):
+def test_error_in_a_choice_concerns_the_chosen_kind_only(load):
     text = complaint(load, "rate: 5\nsections:\n- {kind: notch, frequency: 3 m}\n- {kind: pd, frequency: 3}")
     assert "s.yaml:3: sections.0.frequency: '3 m' is not a quantity in Hz" in text
     assert "s.yaml:4: sections.1.frequency: unknown key" in text
@@ -135,7 +135,7 @@ def test_a_choice_complains_of_its_own_branch_only(load):
     assert len(text.splitlines()) == 3
 
 
-def test_stops_at_twenty_mistakes(load):
+def test_at_most_twenty_mistakes_are_reported(load):
     lines = complaint(load, "rate: 5\n" + "".join(f"k{i}: 1\n" for i in range(30))).splitlines()
     assert len(lines) == 21
     assert lines[-1] == "and 10 more"
@@ -144,11 +144,11 @@ def test_stops_at_twenty_mistakes(load):
 def test_overrides_reach_keys_lists_and_defaults(load):
     got = load("rate: 5", "rate=1 kHz", "limit.slew=5 V/s", "sections.0={kind: pd, gain: 2}", "sections.0.gain=3 V/rad")
     assert (got.rate, got.limit.slew, got.sections[0].gain) == (1000.0, 5.0, 3.0)
-    assert got.limit.high == 3.0  # the default's, as without the override
+    assert got.limit.high == 3.0  # default of the group
     assert load("rate: 5", "law.gain=4").law == Pd(gain=4.0)
 
 
-def test_part_of_a_group_keeps_the_rest_of_its_default(load):
+def test_partial_group_keeps_the_other_defaults(load):
     assert load("rate: 5\nlimit: {slew: 2}").limit == Limit(high=3.0, slew=2.0)
     assert load("rate: 5\nlaw: {kind: notch, frequency: 9}").law == Notch(frequency=9.0)
 
@@ -167,18 +167,18 @@ def test_part_of_a_group_keeps_the_rest_of_its_default(load):
         (".".join("a" * 90) + "=1", "no key is that deep"),
     ],
 )
-def test_a_bad_override_is_named(load, override, message):
+def test_invalid_override_is_named(load, override, message):
     assert message in complaint(load, "rate: 5", override)
 
 
-def test_yaml_keeps_words_that_look_like_something_else(load, tmp_path):
+def test_yaml_keeps_text_that_resembles_other_types(load, tmp_path):
     for word in ("off", "1e3", "true", "null", "", "12:30", "0x1F", "~", "a: b"):
         config = Small(rate=5.0, name=word)
         assert load(to_yaml(config)) == config
-        assert yaml.safe_load(to_yaml(config))["name"] == word  # nor does a reader of YAML 1.1 get it wrong
+        assert yaml.safe_load(to_yaml(config))["name"] == word  # also under YAML 1.1
 
 
-def test_get_and_set():
+def test_get_and_set_of_a_setting():
     config = load_settings("ldu", CONFIGS["ldu"])
     before = get_path(config, "law.position.gain")
     changed = set_path(config, "law.position.gain", "3 V/mm")
@@ -189,7 +189,7 @@ def test_get_and_set():
     assert changed.law.model_fields_set == config.law.model_fields_set
 
 
-def test_set_starts_from_the_default_of_what_was_not_written():
+def test_set_extends_the_default_of_an_unwritten_group():
     config = load_settings("ldu", CONFIGS["ldu"])
     assert get_path(set_path(config, "amplifier.kind", "measured"), "amplifier.kind") == "measured"
     assert set_path(Small(rate=1.0), "limit.slew", "5 V/s").limit == Limit(high=3.0, slew=5.0)
@@ -208,7 +208,7 @@ def test_set_starts_from_the_default_of_what_was_not_written():
         ("law.kind", "notch", "law: missing key 'frequency'"),
     ],
 )
-def test_set_refuses(path, value, message):
+def test_set_refuses_invalid_values(path, value, message):
     with pytest.raises(UserError) as error:
         set_path(Small(rate=5.0, law=Pd(gain=1.0)), path, value)
     assert message in str(error.value)
@@ -223,7 +223,7 @@ def test_set_refuses(path, value, message):
         ("__class__", "unknown key"),
     ],
 )
-def test_get_refuses(path, message):
+def test_get_refuses_unknown_paths(path, message):
     with pytest.raises(UserError, match=message):
         get_path(Small(rate=5.0), path)
 
@@ -269,23 +269,23 @@ def test_any_override_path_or_value_is_settings_or_a_user_error(text, value):
 
 
 @pytest.mark.parametrize("text", ["-1e6", "0x00", "-1.50"])
-def test_a_number_out_of_bounds_is_shown_as_it_was_written(load, text):
+def test_error_shows_a_number_out_of_bounds_as_written(load, text):
     assert f"rate: {text} Hz is out of bounds" in complaint(load, f"rate: {text}\n")
 
 
-def test_an_override_is_shown_as_it_was_written_too(load):
+def test_error_shows_an_override_as_written(load):
     assert "--set rate=-1e3: -1e3 Hz is out of bounds" in complaint(load, "rate: -2.50\n", "rate=-1e3")
 
 
-def test_a_number_too_large_to_be_one_is_not_called_inf(load):
+def test_error_shows_a_too_large_number_as_written(load):
     assert "rate: 9999" in complaint(load, "rate: " + "9" * 390 + "\n")
 
 
-def test_a_check_of_a_group_can_point_at_a_key_inside_it(load):
+def test_group_validator_can_name_a_key_of_the_group(load):
     text = "rate: 5\npairs:\n  - [1, 2]\n  - [10, 2]\n"
     assert complaint(load, text).endswith("s.yaml:4: pairs.1.0: later than 9 s")
     assert "--set pairs.0.0=11: later than 9 s" in complaint(load, text.replace("10,", "3,"), "pairs.0.0=11")
 
 
-def test_an_item_of_a_pair_that_was_not_written_can_be_set(load):
+def test_item_of_an_unwritten_pair_can_be_set(load):
     assert set_path(load("rate: 5\n"), "span.1", 4.0).span == (0.0, 4.0)

@@ -1,4 +1,4 @@
-"""A folder that others may write is refused; the group of this user alone counts as this user."""
+"""A folder writable by others is refused; a group of this user alone counts as this user."""
 
 import grp
 import os
@@ -16,7 +16,7 @@ from rtctl.daemon.server import runtime_dir
 
 @pytest.fixture
 def umask() -> Iterator[None]:
-    """As Debian and Fedora set it for users."""
+    """Default umask of Debian and Fedora."""
     before = os.umask(0o002)
     yield
     os.umask(before)
@@ -40,18 +40,18 @@ def grouped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Pa
     return make
 
 
-def test_a_private_group_is_shut_out_and_the_folder_taken(grouped: Callable[..., Path]) -> None:
+def test_folder_of_a_private_group_is_accepted_and_made_private(grouped: Callable[..., Path]) -> None:
     folder = grouped("user", [])
     below = folder / "steps"
     below.mkdir()
-    private.check(below)  # a folder above stays as it is
+    private.check(below)  # parent folders are unchanged
     assert folder.stat().st_mode & 0o777 == 0o775
     private.check(folder)
     assert folder.stat().st_mode & 0o777 == 0o755
 
 
 @pytest.mark.parametrize(("name", "members"), [("user", ["other"]), ("users", [])])
-def test_a_group_that_others_may_be_in_is_refused(grouped: Callable[..., Path], name: str, members: list[str]) -> None:
+def test_folder_of_a_shared_group_is_refused(grouped: Callable[..., Path], name: str, members: list[str]) -> None:
     folder = grouped(name, members)
     with pytest.raises(UserError, match="may be written by others"):
         private.check(folder)
@@ -60,7 +60,7 @@ def test_a_group_that_others_may_be_in_is_refused(grouped: Callable[..., Path], 
     assert folder.stat().st_mode & 0o777 == 0o775
 
 
-def test_others_are_refused_whatever_the_group(grouped: Callable[..., Path]) -> None:
+def test_folder_writable_by_others_is_refused_for_any_group(grouped: Callable[..., Path]) -> None:
     folder = grouped("user", [])
     folder.chmod(0o777)
     with pytest.raises(UserError, match="chmod go-w"):
@@ -68,16 +68,14 @@ def test_others_are_refused_whatever_the_group(grouped: Callable[..., Path]) -> 
 
 
 @pytest.mark.usefixtures("umask")
-def test_folders_are_made_for_the_user_alone(tmp_path: Path) -> None:
+def test_new_folders_are_private(tmp_path: Path) -> None:
     made = private.made(tmp_path / "a" / "b")
     assert {path.stat().st_mode & 0o777 for path in (made, made.parent)} == {0o700}
-    cache.check_compiled(made)  # numba would make it with the umask, and the next start refuse it
+    cache.check_compiled(made)  # otherwise numba creates it with the umask, and the next start refuses it
     assert (made / "__pycache__").stat().st_mode & 0o777 == 0o700
 
 
-def test_machine_code_of_numba_in_a_folder_of_others_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_numba_cache_in_a_folder_of_others_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     (tmp_path / "made_1").mkdir()
     cache.check_numba()
@@ -86,14 +84,14 @@ def test_machine_code_of_numba_in_a_folder_of_others_is_refused(
         cache.check_compiled(tmp_path)
 
 
-def test_settings_of_numba_in_the_current_folder_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_numba_settings_in_the_current_folder_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / cache.SETTINGS).write_text("cache_dir: /\n")
     with pytest.raises(UserError, match="run rtctl in another folder"):
         cache.check_numba()
 
 
-def test_sockets_lie_in_no_folder_of_others(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_socket_folder_of_others_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     runtime_dir().chmod(0o777)
     with pytest.raises(UserError, match="set XDG_RUNTIME_DIR to a folder of yours"):

@@ -8,7 +8,7 @@ from rtctl.machines import CONFIGS
 
 
 @pytest.mark.parametrize("kind", CONFIGS)
-def test_every_quantity_takes_a_number_or_a_text(kind):
+def test_every_quantity_accepts_a_number_or_text(kind):
     schema = json_schema(CONFIGS[kind])
     assert schema["$schema"].endswith("2020-12/schema")
     json.dumps(schema, allow_nan=False)
@@ -22,7 +22,7 @@ def test_every_quantity_takes_a_number_or_a_text(kind):
     assert [part["type"] for part in slew["anyOf"]] == ["number", "null", "string"]
 
 
-def test_every_reference_of_the_schema_is_there():
+def test_every_reference_of_the_schema_is_defined():
     schema = json_schema(CONFIGS["ldu"])
     names = set(re.findall(r'"#/\$defs/(\w+)"', json.dumps(schema)))
     assert names <= schema["$defs"].keys()
@@ -39,12 +39,12 @@ def test_table_has_a_row_for_each_setting_with_help(kind):
     assert all(row.help for row in rows.values() if row.unit)
 
 
-def test_table_shows_the_default_that_holds_at_its_place():
+def test_settings_table_shows_the_default_at_its_path():
     rows = {row.path: row for row in settings_table(CONFIGS["ldu"])}
     assert rows["law.limit.high"].default == "3.0"
 
 
-def test_a_choice_must_say_which():
+def test_schema_requires_the_kind_of_a_choice():
     schema = json_schema(CONFIGS["ldu"])
     position = schema["$defs"]["LduLawSettings"]["properties"]["position"]
     assert position["required"] == ["kind"]

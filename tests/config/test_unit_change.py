@@ -1,4 +1,4 @@
-"""Settings in other units: symbols of a unit are replaced, and a class takes quantities in the new ones."""
+"""Settings in other units: replaced unit symbols, and classes with quantities in the new units."""
 
 import pytest
 from pydantic import ValidationError
@@ -23,12 +23,12 @@ class Law(Settings):
     ("m/s", {"m": "rad/s"}, "rad/s^2"), ("m", {"m": "m"}, "m"),
     ("1/m", {"m": "rad"}, "1/rad"), ("Hz", {"m": "rad"}, "Hz"),
 ])  # fmt: skip
-def test_symbols_are_replaced(unit, symbols, expected):
+def test_unit_symbols_are_replaced(unit, symbols, expected):
     assert changed(unit, symbols) == expected
-    assert to_si(f"2 {expected}", expected) == 2.0  # a unit that can be written
+    assert to_si(f"2 {expected}", expected) == 2.0  # a valid unit
 
 
-def test_a_class_takes_quantities_in_the_new_units():
+def test_converted_class_accepts_quantities_in_the_new_units():
     made = with_units(Law, TURNS)
     law = made.model_validate({"position": {"kind": "pi_velocity", "gain": "3 mNm*s/rad"}, "limit": {"high": "2 Nm"}})
     assert law.position.gain == pytest.approx(3e-3) and law.limit.high == 2.0
@@ -36,7 +36,7 @@ def test_a_class_takes_quantities_in_the_new_units():
         made.model_validate({"position": {"kind": "pd", "gain": "3 V/m"}})
 
 
-def test_defaults_and_bounds_stay():
+def test_defaults_and_bounds_are_kept():
     made = with_units(Law, TURNS)
     law = made.model_validate({"position": {"kind": "pd", "gain": 1.0}})
     assert law.limit.high == 3.0 and isinstance(law, Law) and isinstance(law.limit, LimitSettings)
@@ -44,6 +44,6 @@ def test_defaults_and_bounds_stay():
         made.model_validate({"position": {"kind": "pd", "gain": -1.0}})
 
 
-def test_the_same_units_give_the_same_class():
+def test_equal_units_give_the_same_class():
     assert with_units(Law, TURNS) is with_units(Law, dict(TURNS))
     assert with_units(Law, {"V": "V"}) is Law

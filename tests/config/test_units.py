@@ -27,11 +27,11 @@ from rtctl.config.units import convert, to_si
         (None, "m", None),
     ],
 )
-def test_reads_what_people_write(text, unit, value):
+def test_common_spellings_of_quantities_are_read(text, unit, value):
     assert to_si(text, unit) == (None if value is None else pytest.approx(value, rel=1e-15))
 
 
-def test_a_hertz_is_a_turn_a_second():
+def test_hertz_is_one_turn_per_second():
     assert to_si("8 Hz", "rad/s") == pytest.approx(16 * math.pi)
     assert to_si("300 rpm", "Hz") == pytest.approx(5.0)
 
@@ -49,7 +49,7 @@ def test_a_hertz_is_a_turn_a_second():
         (True, "m", "true is not a number"),
     ],
 )
-def test_refuses_with_a_sentence(text, unit, message):
+def test_invalid_quantity_gives_an_error_message(text, unit, message):
     with pytest.raises(ValueError, match=message.replace("*", r"\*").replace("(", r"\(").replace(")", r"\)")):
         to_si(text, unit)
 
@@ -64,12 +64,12 @@ def test_any_text_is_a_number_or_a_value_error(text, unit):
 
 @settings(deadline=None)
 @given(st.floats(-1e6, 1e6), st.sampled_from([("mm", "m"), ("rpm", "Hz"), ("mNm", "Nm"), ("deg", "rad")]))
-def test_there_and_back_is_the_same(value, units):
+def test_unit_conversion_is_invertible(value, units):
     there, back = units
     assert convert(convert(value, there, back), back, there) == pytest.approx(value, rel=1e-12, abs=1e-300)
 
 
-def test_a_message_about_a_value_is_one_line():
+def test_error_message_for_a_value_is_one_line():
     with pytest.raises(ValueError) as told:
         to_si("\x85", "V")
     assert len(str(told.value).splitlines()) == 1

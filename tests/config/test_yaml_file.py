@@ -9,7 +9,7 @@ from rtctl.config.errors import UserError
 from rtctl.config.yaml_file import find, load_yaml, parse, told
 
 
-def test_scalars_follow_yaml_1_2():
+def test_yaml_scalars_follow_yaml_1_2():
     data = parse("a: off\nb: yes\nc: true\nd: 1e3\ne: 4.0e-3\nf: 12:30\ng: 010\nh: '5'\ni:\nj: 2001-01-01", "x").data
     assert data == {
         "a": "off", "b": "yes", "c": True, "d": 1000.0, "e": 4e-3, "f": "12:30", "g": 10, "h": "5", "i": None,
@@ -18,7 +18,7 @@ def test_scalars_follow_yaml_1_2():
     assert isinstance(data["d"], float)
 
 
-def test_knows_the_line_of_every_key_and_item():
+def test_line_of_every_key_and_item_is_known():
     document = parse("# title\na:\n  b: 1\n  c:\n    - 5\n    - {d: 6}\n", "x")
     assert [document.line(path) for path in (("a",), ("a", "b"), ("a", "c", 0), ("a", "c", 1, "d"))] == [2, 3, 5, 6]
     assert document.line(("a", "b", "z")) == 3
@@ -41,24 +41,24 @@ def test_knows_the_line_of_every_key_and_item():
         ("a: *b", "f.yaml:1: not YAML: found undefined alias"),
     ],
 )
-def test_bad_text_says_where(text, message):
+def test_yaml_error_names_the_line(text, message):
     with pytest.raises(UserError) as error:
         parse(text, "f.yaml")
     assert message in str(error.value)
 
 
-def test_an_alias_bomb_does_not_unfold():
+def test_alias_bomb_is_not_expanded():
     rows = ["a0: &a0 [x, x, x, x, x, x, x, x, x]"]
     rows += [f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 9)}]" for i in range(1, 9)]
     with pytest.raises(UserError, match="more than 20000 values, aliases unfolded"):
         parse("\n".join(rows), "f.yaml")
 
 
-def test_an_alias_stands_for_its_value():
+def test_alias_has_the_value_of_its_anchor():
     assert parse("a: &x {b: 1}\nc: *x", "f").data == {"a": {"b": 1}, "c": {"b": 1}}
 
 
-def test_files_that_cannot_be_read(tmp_path):
+def test_unreadable_file_is_an_error(tmp_path):
     binary, big = tmp_path / "binary.yaml", tmp_path / "big.yaml"
     binary.write_bytes(b"a: 1\nb: \xff\xfe")
     big.write_bytes(b"#" * (yaml_file.MOST_BYTES + 1))
@@ -74,7 +74,7 @@ def test_files_that_cannot_be_read(tmp_path):
             load_yaml(path)
 
 
-def test_finds_files_as_given_with_suffix_and_packaged(tmp_path, monkeypatch):
+def test_config_is_found_by_path_by_stem_and_among_the_shipped(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "mine.yaml").write_text("a: 1")
     (tmp_path / "ivu").mkdir()
@@ -87,13 +87,13 @@ def test_finds_files_as_given_with_suffix_and_packaged(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     "path", ["./ivu.yaml", "./ivu", "sub/ivu.yaml", "../ivu.yaml", "{here}/ivu.yaml", "~/ivu.yaml"]
 )
-def test_a_path_with_a_folder_is_that_file_or_none(tmp_path, monkeypatch, path):
+def test_path_with_a_folder_never_finds_a_shipped_config(tmp_path, monkeypatch, path):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(UserError, match=r"no such file; the one that comes with rtctl is called by its bare name, ivu"):
         find(path.format(here=tmp_path))
 
 
-def test_which_file_a_name_stands_for(tmp_path, monkeypatch):
+def test_message_names_the_file_of_a_config_name(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert told("ivu.yaml").endswith("configs/ivu.yaml, which comes with rtctl")
     (tmp_path / "ivu.yaml").write_text("machine: ivu")
@@ -109,7 +109,7 @@ def test_which_file_a_name_stands_for(tmp_path, monkeypatch):
         ("", "no such"),
     ],
 )
-def test_not_found_names_the_nearest(name, message):
+def test_unknown_config_error_suggests_the_nearest_name(name, message):
     with pytest.raises(UserError, match=message):
         find(name)
 

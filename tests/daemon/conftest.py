@@ -1,4 +1,4 @@
-"""A command server in a thread, and a handler that remembers."""
+"""Fixtures: a command server in a thread, and a handler that records its requests."""
 
 import errno
 import os
@@ -16,7 +16,7 @@ from rtctl.daemon.server import CommandServer
 
 
 class Echo:
-    """Returns what it was asked; refuses `stop`, fails at `reset`, answers `signals` with too much."""
+    """Handler that returns its request; `stop` is refused, `reset` fails, the result of `signals` is too large."""
 
     def __init__(self) -> None:
         self.seen: list[tuple[str, Any]] = []

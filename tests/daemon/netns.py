@@ -1,7 +1,7 @@
-"""Two hosts in one machine: a network namespace each, and a cable between them that can be slow, lossy or cut.
+"""Two emulated hosts: a network namespace each, and a cable between them with delay, loss or an interruption.
 
-The cable is a veth pair shaped by `tc netem`. Where the kernel has no netem, it is a pair of tun devices between which
-a thread carries the packets, late or not at all.
+The cable is a veth pair shaped by `tc netem`. Without netem in the kernel, the cable is a pair of tun devices; a thread
+forwards the packets between them with the delay and the loss.
 """
 
 import contextlib
@@ -26,11 +26,11 @@ number = itertools.count(1)
 
 
 class NotHereError(Exception):
-    """This machine allows no network namespaces, or no cable between them; the message says which."""
+    """This machine allows no network namespaces, or no cable between them; the message names the missing part."""
 
 
 def run(*command: str) -> None:
-    """A command that must succeed. Raises NotHereError with what it said."""
+    """Run a command that must succeed. A failure raises NotHereError with the output of the command."""
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode:
         raise NotHereError(f"`{' '.join(command)}` failed: {done.stderr.strip()}")
@@ -148,13 +148,13 @@ class Wire:
                     heapq.heappush(waiting, (time.monotonic() + self.delay, next(order), other[end], packet))
             while waiting and waiting[0][0] <= time.monotonic():
                 *_, end, packet = heapq.heappop(waiting)
-                with contextlib.suppress(OSError):  # that end is down: a packet lost
+                with contextlib.suppress(OSError):  # the far end is down: the packet is lost
                     os.write(end, packet)
                     self.carried += 1
 
 
 class Host:
-    """One of the two: its own runtime folder and keys, and `rtctl` run inside its namespace."""
+    """One host: a runtime folder, keys, and `rtctl` run inside its namespace."""
 
     def __init__(self, namespace: str, folder: Path):
         self.namespace, self.runtime, self.config = namespace, folder / "run", folder / "config"
@@ -167,7 +167,7 @@ class Host:
         return self.config / "rtctl" / "keys"
 
     def popen(self, *command: str) -> subprocess.Popen[str]:
-        """A program on this host. It ends with the test, also where that is killed."""
+        """A program on this host. The program ends with the test process, also when the test process is killed."""
         bound = ["setpriv", "--pdeathsig", "TERM"] if shutil.which("setpriv") else []
         inside = ["ip", "netns", "exec", self.namespace, *bound, *command]
         return subprocess.Popen(inside, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=self.environment)

@@ -1,4 +1,4 @@
-"""A board in the plant's place: what reaches the card, and when it does not."""
+"""Board process in place of the emulated plant: which outputs reach the card, and when they are switched off."""
 
 import sys
 from pathlib import Path
@@ -24,7 +24,7 @@ STEP = 20 / 4096
 
 
 class Stand:
-    """A board process without the process: the loop's end of the link in a test's hands."""
+    """Board plant called in the test process; the test plays the loop's end of the link."""
 
     def __init__(self, config):
         self.rig = rigs.emulated(wiring(config))
@@ -36,7 +36,7 @@ class Stand:
         self.tx["magic"], self.tx["version"] = frames.MAGIC, frames.VERSION
 
     def order(self, codes, state=safety.RUNNING, lines=0, age=0.0):
-        """Send outputs that answer a sample of `age` s ago, have one turn of the board, and read what it sampled."""
+        """Send outputs that answer a sample of `age` s ago, run one turn of the board, return its new sample."""
         self.tx["seq"] += 1
         self.tx["ao_codes"][0][: len(codes)] = codes
         self.tx["state"], self.tx["dio_lines"] = state, lines
@@ -53,7 +53,7 @@ class Stand:
 
 @pytest.fixture
 def stand(config):
-    """`stand("ivu")`: a board with that machine's wiring; a link that is not in a hurry."""
+    """`stand("ivu")`: a board with the wiring of that machine and a long link timeout."""
 
     def make(kind="ivu", **changes):
         changes = {"safety.link_timeout": 100.0, "loop.realtime": "off", **changes}
@@ -62,7 +62,7 @@ def stand(config):
     return make
 
 
-def test_codes_go_out_and_samples_come_back_with_the_frames_numbers(stand):
+def test_board_writes_output_codes_and_returns_numbered_samples(stand):
     ivu = stand()
     ivu.rig.pulse(0, 42)
     ivu.rig.set_input(1, 2.5)
@@ -74,14 +74,14 @@ def test_codes_go_out_and_samples_come_back_with_the_frames_numbers(stand):
     assert np.isnan(sample["truth"]).all()
 
 
-def test_a_machine_that_is_off_has_no_volts_whatever_its_frame_says(stand):
+def test_outputs_are_zero_in_state_idle_whatever_codes_the_frame_holds(stand):
     ivu = stand()
     ivu.order((100, 100))
     ivu.order((100, 100), safety.IDLE)
     assert ivu.volts == [0.0, 0.0]
 
 
-def test_after_a_trip_outputs_only_shrink(stand):
+def test_outputs_only_shrink_after_a_trip(stand):
     ivu = stand()
     ivu.order((100, -100))
     ivu.order((60, -101), safety.TRIPPED)
@@ -90,7 +90,7 @@ def test_after_a_trip_outputs_only_shrink(stand):
     assert ivu.volts == [0.0, 0.0]
 
 
-def test_outputs_that_answer_an_old_sample_are_off(stand):
+def test_outputs_older_than_the_link_timeout_are_switched_off(stand):
     ivu = stand()
     ivu.order((100, 100), age=99.0)
     assert ivu.volts == [100 * STEP, 100 * STEP]
@@ -98,7 +98,7 @@ def test_outputs_that_answer_an_old_sample_are_off(stand):
     assert ivu.volts == [0.0, 0.0]
 
 
-def test_a_loop_that_is_gone_leaves_nothing_on(stand):
+def test_outputs_go_to_zero_when_the_loop_stops_sending(stand):
     ivu = stand(**{"safety.link_timeout": 0.05})
     ivu.order((100, 100))
     begun = board_plant.now()
@@ -108,7 +108,7 @@ def test_a_loop_that_is_gone_leaves_nothing_on(stand):
     assert board_plant.now() - begun > 0.04e9
 
 
-def test_the_direction_line_and_both_counters_of_the_ldu(stand):
+def test_ldu_board_sets_the_direction_line_and_reads_both_counters(stand):
     ldu = stand("ldu")
     ldu.rig.pulse(1, -3)
     sample = ldu.order((10,), lines=0b1)
@@ -116,7 +116,7 @@ def test_the_direction_line_and_both_counters_of_the_ldu(stand):
     assert list(sample["counter_codes"][:2]) == [daq_stc.INITIAL_COUNT, daq_stc.INITIAL_COUNT - 3]
 
 
-def test_a_card_that_fails_while_it_runs_ends_it_with_the_outputs_off(stand):
+def test_card_failure_while_running_ends_the_board_with_outputs_off(stand):
     ivu = stand()
     ivu.order((100, 100))
     ivu.rig.fail("inputs")
@@ -126,7 +126,7 @@ def test_a_card_that_fails_while_it_runs_ends_it_with_the_outputs_off(stand):
     assert ivu.status["ended"][0] == 1
 
 
-def test_told_to_stop_it_leaves_zero_behind(stand):
+def test_stop_request_zeroes_the_outputs_and_closes_the_card(stand):
     ivu = stand()
     ivu.order((100, 100))
     ivu.status["stop"] = 1
@@ -135,7 +135,7 @@ def test_told_to_stop_it_leaves_zero_behind(stand):
     assert not ivu.rig.card.is_open
 
 
-def test_the_card_of_a_process_that_was_killed_is_opened_anew_and_zeroed(config, monkeypatch):
+def test_card_of_a_killed_process_is_reopened_and_zeroed(config, monkeypatch):
     settings = config("ivu", mode="real")
     rig = rigs.emulated(wiring(settings))
     rig.card.open()

@@ -1,4 +1,4 @@
-"""A machine on a bus in real time: emulated nodes that move, a run that follows, and one whose node falls silent."""
+"""Machines on a bus in real time: emulated moving nodes, a run without a trip, and a node that stops sending."""
 
 import contextlib
 import os
@@ -24,7 +24,7 @@ pytestmark = pytest.mark.realtime
 
 
 class Motor:
-    """A rotor with drag, moved on by the wall clock."""
+    """A rotor with drag, integrated over wall-clock time."""
 
     def __init__(self) -> None:
         self.angle = self.speed = 0.0
@@ -40,7 +40,7 @@ class Motor:
 
 
 class Drive(Nodes):
-    """An ODrive with a motor; it listens at a socket, since a kernel need not have a virtual CAN."""
+    """An ODrive with a motor. The bus is a socket, since a kernel need not have a virtual CAN."""
 
     def __init__(self, bus: socket.socket) -> None:
         self.motor = Motor()
@@ -67,7 +67,7 @@ class Micro(serial_device.Device):
 
 @contextlib.contextmanager
 def listening(path: Path):
-    """Each connection gets a drive; the newest stands in the list."""
+    """Serve a drive for each connection; the newest drive is the last of the list."""
     drives: list[Drive] = []
     listener = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     listener.bind(str(path))
@@ -104,7 +104,7 @@ def config(name: str, *changes: str):
     return common.load_config(f"boards/{name}", [*slack, *changes])
 
 
-def test_a_machine_on_canSimple_follows_and_is_idle_afterwards(runtime, tmp_path):
+def test_axis_on_can_simple_follows_and_its_drive_is_idle_after_the_run(runtime, tmp_path):
     with listening(tmp_path / "bus") as drives:
         settings = config("axis_odrive", f"driver.interface=unix:{tmp_path / 'bus'}")
         result = Session(settings, tmp_path / "b", 2.0).run()
@@ -116,7 +116,7 @@ def test_a_machine_on_canSimple_follows_and_is_idle_afterwards(runtime, tmp_path
     assert np.abs(columns["torque"]).max() > 0.01
 
 
-def test_a_node_that_falls_silent_trips_with_its_own_words(runtime, tmp_path, capfd):
+def test_silent_can_node_trips_link_lost_and_is_named_in_the_output(runtime, tmp_path, capfd):
     with listening(tmp_path / "bus") as drives:
         settings = config("axis_odrive", f"driver.interface=unix:{tmp_path / 'bus'}", "driver.timeout=0.2 s")
         fall = threading.Timer(0.1, lambda: None)
@@ -138,7 +138,7 @@ def test_a_node_that_falls_silent_trips_with_its_own_words(runtime, tmp_path, ca
     assert "node 1 (torque, encoder) has sent no encoder estimates for" in told.err + told.out
 
 
-def test_a_machine_on_a_microcontroller_follows(runtime, tmp_path):
+def test_axis_on_a_microcontroller_follows_without_a_trip(runtime, tmp_path):
     device = Micro(serial_device.library(tmp_path))
     try:
         settings = config("axis_serial", f"driver.port={device.port}")

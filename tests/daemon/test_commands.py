@@ -1,4 +1,4 @@
-"""Who counts as the commander of a machine that requires one."""
+"""Which clients count as the commander of a machine that requires one."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -13,12 +13,12 @@ from rtctl.daemon.server import CommandServer
 
 
 class Machine:
-    """As much of a supervisor as is asked here; `lost` is what the loop was told last."""
+    """Stub of a supervisor; `lost` is the last value of `commander_lost` sent to the loop."""
 
     def __init__(self) -> None:
         self.config = SimpleNamespace(
             safety=SimpleNamespace(require_commander=True, commander_timeout=1.0),
-            loop=SimpleNamespace(mode="fused"),  # on the wall clock the loop itself looks at the time
+            loop=SimpleNamespace(mode="fused"),  # in real mode the loop checks the timeout itself
         )
         self.status = {"tick": 0, "state": 0}
         self.command: dict[str, int] = {"disarm": 0}
@@ -41,7 +41,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     return now
 
 
-def test_who_only_looks_stands_in_for_no_commander(clock: list[float]) -> None:
+def test_read_only_requests_do_not_count_as_a_commander(clock: list[float]) -> None:
     machine: Any = Machine()
     handler = Commands(machine)
     for _ in range(4):
@@ -56,7 +56,7 @@ def test_who_only_looks_stands_in_for_no_commander(clock: list[float]) -> None:
     assert set(LOOKS) <= set(OPS)
 
 
-def test_a_ping_is_a_sign_of_life(clock: list[float], tmp_path: Any) -> None:
+def test_ping_resets_the_commander_timeout(clock: list[float], tmp_path: Any) -> None:
     machine: Any = Machine()
     handler, context = Commands(machine), zmq.Context()
     server = CommandServer(f"ipc://{tmp_path}/s", handler, context, heard=handler.heard)

@@ -1,4 +1,4 @@
-"""docs/protocol.md says what the code does: every op, error code and limit, and examples that run."""
+"""docs/protocol.md agrees with the code: ops, error codes, limits, and examples that run."""
 
 import re
 import threading
@@ -22,7 +22,7 @@ def table(title):
     return [[cell.strip() for cell in line.strip("|").split("|")] for line in section.splitlines() if line[:3] == "| `"]
 
 
-def test_ops_and_their_arguments():
+def test_documented_ops_and_arguments_are_those_of_the_code():
     rows = {cells[0].strip("`"): cells[1] for cells in table("Ops")}
     assert list(rows) == list(protocol.OPS)
     for op, model in protocol.OPS.items():
@@ -32,11 +32,11 @@ def test_ops_and_their_arguments():
         assert rows[op].count("`") == 2 * len(model.model_fields)
 
 
-def test_error_codes():
+def test_documented_error_codes_are_those_of_the_code():
     assert [cells[0].strip("`") for cells in table("Error codes")] == list(protocol.ERRORS)
 
 
-def test_limits():
+def test_documented_limits_are_those_of_the_code():
     assert f"{protocol.MAX_BYTES // 1024} KiB; over" in DOC
     assert f"| nesting | {protocol.MAX_DEPTH} levels |" in DOC
     assert f"| text | {protocol.LIMITS['max_str_len'] // 1024} KiB;" in DOC
@@ -46,7 +46,7 @@ def test_limits():
 
 
 @pytest.mark.parametrize("code", EXAMPLES, ids=range(len(EXAMPLES)))
-def test_examples_run(code, serving, context, monkeypatch, tmp_path, capsys):
+def test_documented_examples_run(code, serving, context, monkeypatch, tmp_path, capsys):
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     done = threading.Event()
     telemetry = Telemetry(default_endpoint("ivu", "telemetry"), "ivu", ["v"], context)

@@ -1,4 +1,4 @@
-"""Doors of a daemon: a flood of connections takes places and nothing else, and control stays in reach."""
+"""Doors (connection limiters) of a daemon: under a flood of connections the command socket still answers."""
 
 import contextlib
 import json
@@ -26,7 +26,7 @@ from rtctl.daemon.protocol import decode_reply, encode_request
 from rtctl.daemon.server import CommandServer
 from rtctl.daemon.telemetry import Telemetry
 
-SCARCE = 200  # file descriptors of the daemon in these tests; libzmq aborts where it has none left
+SCARCE = 200  # file descriptors of the daemon in these tests; libzmq aborts when none is left
 
 
 class Machine:
@@ -37,7 +37,7 @@ class Machine:
 
 
 class Daemon:
-    """Command socket and telemetry behind doors, with turns as the supervisor has them."""
+    """Command socket and telemetry behind doors; `turn` is one turn of the supervisor."""
 
     def __init__(self, folder: Path, endpoint: str):
         self.doors, self.context = Doors(folder, "m"), zmq.Context()
@@ -87,7 +87,7 @@ def daemon(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Daemon]:
 
 
 def connect(endpoint: str) -> socket.socket | None:
-    """A connection that says nothing; None where it is not taken now."""
+    """A connection that sends nothing; None when the socket does not accept it now."""
     kind, _, address = endpoint.partition("://")
     made = socket.socket(socket.AF_UNIX if kind == "ipc" else socket.AF_INET)
     made.setblocking(False)
@@ -116,34 +116,34 @@ def flood(daemon: Daemon, endpoint: str, count: int = 300) -> Iterator[list[sock
             each.close()
 
 
-def test_it_answers_and_the_port_is_known(daemon: Daemon) -> None:
+def test_daemon_behind_doors_answers_and_its_port_is_known(daemon: Daemon) -> None:
     assert not daemon.server.endpoint.endswith("*")
     assert daemon.ask(daemon.server.endpoint) == {"op": "disarm"}
     assert daemon.ask(daemon.server.endpoint, "ping")["pid"] == os.getpid()
 
 
-def test_control_answers_under_a_flood_of_viewers_and_of_its_own(daemon: Daemon) -> None:
+def test_command_socket_answers_under_a_flood_of_viewers_and_of_clients(daemon: Daemon) -> None:
     before = len(list(Path("/proc/self/fd").iterdir()))
     with flood(daemon, daemon.telemetry.endpoint), flood(daemon, daemon.server.endpoint) as own:
         assert daemon.ask(daemon.server.endpoint) == {"op": "disarm"}
         assert (
             len(list(Path("/proc/self/fd").iterdir())) - before < 600 + 60
-        )  # those of the test, and a place each of the doors
+        )  # sockets of the test, and the places of the doors
         own.append(connect(daemon.server.endpoint) or own[0])
         assert daemon.ask(daemon.server.endpoint, "ping")["pid"] == os.getpid()
 
 
-def test_a_question_under_way_is_answered_whoever_comes_after_it(daemon: Daemon) -> None:
+def test_pending_request_is_answered_despite_later_connections(daemon: Daemon) -> None:
     daemon.ask(daemon.server.endpoint)  # the door is served
     context = zmq.Context()
     peer = context.socket(zmq.DEALER)
     peer.connect(daemon.server.endpoint)
     peer.send(encode_request(1, "ping", {}))
-    assert daemon.server.socket.poll(20_000)  # it is with the daemon, which is busy, while others come
+    assert daemon.server.socket.poll(20_000)  # the request has reached the daemon, which does not process it yet
     held: list[socket.socket] = []
     deadline = time.monotonic() + 60
     try:
-        while sum(was_closed(each) for each in held) < 10:  # the places are taken, and taken again
+        while sum(was_closed(each) for each in held) < 10:  # all places are taken and replaced
             assert time.monotonic() < deadline
             made = connect(daemon.server.endpoint)
             held += [made] if made is not None else []
@@ -159,7 +159,7 @@ def test_a_question_under_way_is_answered_whoever_comes_after_it(daemon: Daemon)
 
 
 def was_closed(end: socket.socket) -> bool:
-    """Whether the other side has closed a connection. It reads the greeting that came first."""
+    """Whether the other side has closed a connection. The call reads the ZMTP greeting first."""
     try:
         while end.recv(4096):
             pass
@@ -170,10 +170,10 @@ def was_closed(end: socket.socket) -> bool:
         return True
 
 
-def test_who_is_active_keeps_the_place(daemon: Daemon) -> None:
+def test_active_client_keeps_its_connection(daemon: Daemon) -> None:
     context = zmq.Context()
     peer = context.socket(zmq.DEALER)
-    peer.setsockopt(zmq.RECONNECT_IVL, -1)  # once gone it is gone
+    peer.setsockopt(zmq.RECONNECT_IVL, -1)  # no reconnection
     peer.connect(daemon.server.endpoint)
     held = []
     try:
@@ -191,7 +191,7 @@ def test_who_is_active_keeps_the_place(daemon: Daemon) -> None:
                 each.close()
 
 
-def test_viewers_see_and_one_too_many_is_not_let_in(daemon: Daemon) -> None:
+def test_viewers_receive_telemetry_and_a_viewer_beyond_the_limit_is_closed(daemon: Daemon) -> None:
     context = zmq.Context()
     viewers = []
     for _ in range(4):
@@ -211,12 +211,12 @@ def test_viewers_see_and_one_too_many_is_not_let_in(daemon: Daemon) -> None:
         daemon.turn()
         with contextlib.suppress(BlockingIOError):
             data = extra.recv(1)
-    assert data == b""  # it was closed
+    assert data == b""  # closed by the door
     extra.close()
     context.destroy(linger=0)
 
 
-def test_a_viewer_that_does_not_read_holds_up_nobody(daemon: Daemon) -> None:
+def test_viewer_that_does_not_read_does_not_block_the_daemon(daemon: Daemon) -> None:
     context = zmq.Context()
     slow = context.socket(zmq.SUB)
     slow.rcvhwm = 1
@@ -229,7 +229,7 @@ def test_a_viewer_that_does_not_read_holds_up_nobody(daemon: Daemon) -> None:
     context.destroy(linger=0)
 
 
-def test_a_door_that_was_killed_opens_again(daemon: Daemon) -> None:
+def test_killed_door_process_is_restarted(daemon: Daemon) -> None:
     daemon.ask(daemon.server.endpoint)
     process = daemon.doors._processes["control"]
     process.send_signal(signal.SIGKILL)
@@ -238,7 +238,7 @@ def test_a_door_that_was_killed_opens_again(daemon: Daemon) -> None:
     assert daemon.doors._processes["control"].pid != process.pid
 
 
-def test_the_answer_to_the_last_request_still_goes_out(tmp_path: Path) -> None:
+def test_reply_to_the_last_request_is_sent_before_the_daemon_closes(tmp_path: Path) -> None:
     made = Daemon(tmp_path, f"ipc://{tmp_path}/m.command")
     made.ask(made.server.endpoint)
     context = zmq.Context()
@@ -262,7 +262,7 @@ def test_the_answer_to_the_last_request_still_goes_out(tmp_path: Path) -> None:
         ((80_000, 90_000), None),
     ],
 )
-def test_the_limit_of_open_files_is_raised_and_never_lowered(
+def test_limit_of_open_files_is_raised_and_never_lowered(
     monkeypatch: pytest.MonkeyPatch, limits: tuple[int, int], then: tuple[int, int] | None
 ) -> None:
     kept = []
@@ -273,24 +273,24 @@ def test_the_limit_of_open_files_is_raised_and_never_lowered(
 
 
 @pytest.mark.parametrize("endpoint", ["tcp://127.0.0.1:99999", "tcp://127.0.0.1:x", "tcp://:5"])
-def test_what_is_no_address(endpoint: str) -> None:
+def test_invalid_tcp_address_is_refused(endpoint: str) -> None:
     with pytest.raises(ValueError):
         listen_tcp(endpoint)
 
 
-def test_an_interface_by_its_name() -> None:
+def test_tcp_endpoint_may_name_a_network_interface() -> None:
     listener, bound = listen_tcp("tcp://lo:*")
     assert bound == f"tcp://lo:{listener.getsockname()[1]}" and listener.getsockname()[0] == "127.0.0.1"
     listener.close()
 
 
-def test_a_taken_address_is_told(daemon: Daemon, tmp_path: Path) -> None:
+def test_address_in_use_is_an_error(daemon: Daemon, tmp_path: Path) -> None:
     with pytest.raises(UserError, match="in use by another"):
         Daemon(tmp_path, daemon.server.endpoint)
 
 
 @pytest.mark.realtime
-def test_a_machine_outlives_a_flood_with_few_file_descriptors(runtime: Path, tmp_path: Path) -> None:
+def test_daemon_survives_a_connection_flood_with_few_file_descriptors(runtime: Path, tmp_path: Path) -> None:
     """The whole daemon with SCARCE file descriptors, under connections to all of its sockets."""
     words = (
         f"import resource; resource.setrlimit(resource.RLIMIT_NOFILE, ({SCARCE}, {SCARCE}));"
@@ -316,7 +316,7 @@ def test_a_machine_outlives_a_flood_with_few_file_descriptors(runtime: Path, tmp
                 while len(held) < 200 * (1 + ("telemetry", "rows", "command").index(which)):
                     made = connect(f"ipc://{runtime}/rtctl/flooded.{which}")
                     held += [made] if made is not None else []
-            # The flood takes the place of who has been silent longest. Whoever asks at that moment loses one question.
+            # The flood replaces the connection that was silent longest. A request sent at that moment is lost.
             for _ in range(3):
                 with contextlib.suppress(UserError):
                     assert client.call("disarm")

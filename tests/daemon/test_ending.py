@@ -1,4 +1,4 @@
-"""Runs that end by themselves while the supervisor lives: the recording is whole and says why."""
+"""Runs whose loop fails while the supervisor lives: the bundle is complete and names the failure."""
 
 import json
 import os
@@ -20,7 +20,7 @@ from rtctl.daemon.shared_memory import segment_path
 from rtctl.daemon.supervisor import Supervisor
 from rtctl.trace.bundle import load_bundle
 
-LONG = 4000.0  # s of virtual time, more than passes before the signal comes
+LONG = 4000.0  # s of virtual time; the loop is killed long before
 
 
 def kill_loop(supervisor: Supervisor, number: int = signal.SIGKILL, after: int = 600) -> None:
@@ -28,7 +28,7 @@ def kill_loop(supervisor: Supervisor, number: int = signal.SIGKILL, after: int =
         os.kill(supervisor.loop.pid, number)
 
 
-def test_a_killed_loop_leaves_a_whole_bundle_and_one_sentence(
+def test_killed_loop_leaves_a_complete_bundle_and_one_message(
     runtime: Path,
     config: Callable[..., Any],
     tmp_path: Path,
@@ -59,7 +59,7 @@ def test_a_killed_loop_leaves_a_whole_bundle_and_one_sentence(
     assert not segment_path(settings.name).exists()
 
 
-def test_an_error_that_a_child_reports_ends_the_run_with_a_whole_recording(
+def test_error_reported_by_a_child_ends_the_run_with_a_complete_bundle(
     runtime: Path, config: Callable[..., Any], tmp_path: Path
 ) -> None:
     reports = [{"event": "error", "message": "the plant stopped answering"}]
@@ -76,7 +76,7 @@ def test_an_error_that_a_child_reports_ends_the_run_with_a_whole_recording(
     assert 0 < found.case["rows"] < LONG * 500
 
 
-def test_a_report_that_comes_after_the_last_tick_is_waited_for() -> None:
+def test_supervisor_waits_for_an_error_report_after_the_last_tick() -> None:
     order: list[str] = []
     loop = SimpleNamespace(process=SimpleNamespace(wait=lambda _: order.append("waited"), poll=lambda: 2))
 
@@ -90,7 +90,7 @@ def test_a_report_that_comes_after_the_last_tick_is_waited_for() -> None:
 
 
 @pytest.mark.parametrize(("code", "words"), [(-9, "killed by SIGKILL (out of memory"), (-40, "killed by signal 40")])
-def test_a_signal_has_its_name(code: int, words: str) -> None:
+def test_failure_names_the_signal_that_killed_the_process(code: int, words: str) -> None:
     child = SimpleNamespace(process=SimpleNamespace(poll=lambda: code), last_words=lambda: "")
     assert starting.ended(child).startswith(words)
     with pytest.raises(RunFailed, match="died after tick 7: killed by"):

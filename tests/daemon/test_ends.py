@@ -1,4 +1,4 @@
-"""What is left when a supervisor is killed or a disk is full: ended children, a trace that can be read, a free name."""
+"""Killed supervisors and full disks: children end, the trace is readable, the machine name is free again."""
 
 import contextlib
 import json
@@ -26,7 +26,7 @@ from rtctl.trace.bundle import load_bundle
 from rtctl.trace.recorder import Recorder
 from rtctl.trace.repair import repair
 
-# a busy machine is no reason to trip
+# safety limits that do not trip on a busy machine
 QUIET = {"safety.missed_ticks": 0, "safety.link_timeout": 5.0, "safety.disagreement": 0.0}
 RUN = """
 import json, resource, sys
@@ -73,7 +73,7 @@ def process(runtime: Path) -> Iterator[Callable[..., subprocess.Popen]]:
 
 
 def gone(pid: int) -> bool:
-    """Whether a process has ended; one that waits to be reaped has."""
+    """Whether a process has ended; a zombie counts as ended."""
     try:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "Z"
     except (FileNotFoundError, ProcessLookupError):
@@ -90,7 +90,7 @@ def wait_for(what: Callable[[], Any], seconds: float) -> Any:
 
 @pytest.mark.realtime
 @pytest.mark.parametrize("link", ["shm", "zmq"])
-def test_children_end_with_their_supervisor_and_the_last_seconds_can_be_read(
+def test_children_end_with_a_killed_supervisor_and_the_ring_stays_readable(
     config: Callable[..., Any], process: Callable[..., subprocess.Popen], tmp_path: Path, link: str
 ) -> None:
     from rtctl import machines
@@ -126,7 +126,7 @@ def test_children_end_with_their_supervisor_and_the_last_seconds_can_be_read(
     assert 0 < report.rows <= ticks and (kept["tick"] == np.arange(report.rows)).all()
 
 
-def test_a_name_whose_daemon_was_killed_is_free_again(
+def test_machine_name_of_a_killed_daemon_is_free_again(
     config: Callable[..., Any], process: Callable[..., subprocess.Popen], tmp_path: Path
 ) -> None:
     settings = config(mode="real", set=QUIET)
@@ -142,10 +142,10 @@ def test_a_name_whose_daemon_was_killed_is_free_again(
     assert not path.exists()
 
 
-def test_a_full_disk_ends_the_recording_and_not_the_run(
+def test_full_disk_ends_the_recording_but_not_the_run(
     config: Callable[..., Any], process: Callable[..., subprocess.Popen], tmp_path: Path
 ) -> None:
-    """A limit on the size of files stands in for the disk; the segment must fit below it."""
+    """A limit on the file size emulates the full disk; the segment must fit below the limit."""
     settings = config(set={"record.seconds": 2.0})
     Session(settings, tmp_path / "warm", 0.1).run()
     limit = 3_000_000
@@ -171,7 +171,7 @@ def layout_of(config: Any) -> dict[str, Any]:
 
 @pytest.fixture
 def small_disk(tmp_path: Path) -> Iterator[Path]:
-    """A file system that a recording fills but for what the test lets it."""
+    """A file system of 64 MB for a recording and a file that fills the rest."""
     folder = tmp_path / "disk"
     folder.mkdir()
     mount = ["mount", "-t", "tmpfs", "-o", "size=64m", "tmpfs", str(folder)]
@@ -184,10 +184,10 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
     subprocess.run(["umount", "-l", str(folder)], check=False)
 
 
-def test_a_disk_without_room_for_the_bundle_is_told_and_repaired_once_there_is(
+def test_bundle_that_does_not_fit_on_the_disk_is_reported_and_can_be_repaired(
     runtime: Path, config: Callable[..., Any], small_disk: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Rows fit while it runs; then somebody else fills the disk, before they become a bundle."""
+    """The rows fit during the run. Another file fills the disk before the rows become a bundle."""
     out, filler, finish = small_disk / "bundle", small_disk / "filler", Recorder.finish
 
     def full(self: Recorder, *args: Any) -> Path:

@@ -1,4 +1,4 @@
-"""Trips in the log, and troubles of the recording: said and logged at once, and in the exit code of `rtctl run`."""
+"""Trips in the log; failures of the recording in the console, the log and the exit code of `rtctl run`."""
 
 import json
 import shutil
@@ -23,7 +23,7 @@ from rtctl.trace.bundle import load_bundle
 from rtctl.trace.orders import orders
 from rtctl.trace.stream import StreamWriter
 
-HOLD = 2000  # tick at which the run waits for what happens to its folder
+HOLD = 2000  # tick at which the run waits while the test changes its folder
 Run = Callable[[Callable[[Path], Any]], tuple[int, dict[str, Any], str]]
 
 
@@ -35,7 +35,7 @@ def run(
     monkeypatch: pytest.MonkeyPatch,
     capfd: pytest.CaptureFixture[str],
 ) -> Run:
-    """`run(what)` is `rtctl run` of 12 s with `what(folder)` in the middle: exit code, JSON, standard error."""
+    """`run(what)`: `rtctl run` of 12 s that calls `what(folder)` at tick HOLD; returns exit code, JSON, stderr."""
     monkeypatch.setattr(recorder, "LOOK", 0.0)
     settings = config(set={"record.seconds": 2.0})
     (tmp_path / "ivu.yaml").write_text(to_yaml(settings))
@@ -50,7 +50,7 @@ def run(
                 supervisor.status["hold"] = 0
 
         def held(self: Supervisor) -> Iterator[None]:
-            self.status["hold"] = HOLD  # more than the ring takes before the first turn
+            self.status["hold"] = HOLD  # tick beyond the capacity of the ring before the first turn
             yield from turns(self)
 
         turns = Supervisor.run
@@ -65,7 +65,7 @@ def run(
     return play
 
 
-def test_a_folder_that_is_renamed_in_a_run(run: Run, tmp_path: Path) -> None:
+def test_recording_follows_a_folder_renamed_during_the_run(run: Run, tmp_path: Path) -> None:
     code, result, said = run(lambda folder: folder.rename(folder.with_name("other")))
     assert code == 1 and result["bundle"] == str(tmp_path / "other")
     assert f"recording: {tmp_path / 'bundle'} was renamed while it was recorded" in " ".join(said.split())
@@ -73,14 +73,14 @@ def test_a_folder_that_is_renamed_in_a_run(run: Run, tmp_path: Path) -> None:
     assert len(load_bundle(tmp_path / "other").columns["tick"]) == 6000 and not (tmp_path / "bundle").exists()
 
 
-def test_a_folder_that_is_deleted_in_a_run(run: Run, tmp_path: Path) -> None:
+def test_recording_is_rescued_when_its_folder_is_deleted_during_the_run(run: Run, tmp_path: Path) -> None:
     code, result, _ = run(shutil.rmtree)
     rescued = tmp_path / "bundle-rescued"
     assert code == 1 and result["bundle"] == str(rescued) and "was deleted" in result["rows"]["error"]
     assert len(load_bundle(rescued).columns["tick"]) == 6000 and len(orders(rescued)) == 1
 
 
-def test_a_disk_that_is_full_is_the_exit_code(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_full_disk_sets_the_exit_code(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     def full(*_: Any) -> int:
         raise OSError(28, "No space left on device")
 
@@ -89,7 +89,7 @@ def test_a_disk_that_is_full_is_the_exit_code(run: Run, monkeypatch: pytest.Monk
     assert "No space left" in result["rows"]["error"] and "recording: [Errno 28] No space left" in said
 
 
-def test_a_program_goes_on_with_a_whole_recording_only() -> None:
+def test_whole_raises_for_an_interrupted_or_incomplete_recording() -> None:
     good = {"interrupted": False, "rows": {"error": None}}
     assert whole(good) is good
     with pytest.raises(RunFailed, match="recording: full"):
@@ -98,7 +98,7 @@ def test_a_program_goes_on_with_a_whole_recording_only() -> None:
         whole({**good, "interrupted": True})
 
 
-def test_rows_that_cannot_be_rescued_are_told_as_lost(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_rows_that_cannot_be_rescued_are_reported_as_lost(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     def full(*_: Any) -> int:
         raise OSError(28, "No space left on device")
 
@@ -107,7 +107,7 @@ def test_rows_that_cannot_be_rescued_are_told_as_lost(run: Run, monkeypatch: pyt
     assert code == 2 and "the rows could not be rescued: they are lost" in said.splitlines()[-1]
 
 
-def test_a_trouble_is_said_once() -> None:
+def test_recording_failure_is_reported_once() -> None:
     said: list[str] = []
     watch = Recording(said.append)
     for trouble in (None, "full", "full", "full; moved", "full; moved"):

@@ -1,4 +1,4 @@
-"""Faults of processes: at their very tick on virtual time, and nothing of them is left behind."""
+"""Injected process faults: exact tick on virtual time, and full cleanup afterwards."""
 
 import ast
 import os
@@ -36,7 +36,7 @@ def gone(pid: int) -> bool:
         return True
 
 
-def test_add_list_and_clear(runtime: Path, config: Callable[..., Any]) -> None:
+def test_faults_are_added_listed_and_cleared(runtime: Path, config: Callable[..., Any]) -> None:
     settings = config(set={"faults": [{"fault": "link.silent", "at": 1e5}]})
     with Supervisor(settings, None, 100) as supervisor:
         handle = supervisor.faults.handle
@@ -59,14 +59,14 @@ def test_add_list_and_clear(runtime: Path, config: Callable[..., Any]) -> None:
         ({"fault": "link.delay", "size": 2.0, "extra": 1}, "extra"),
     ],
 )
-def test_what_cannot_be_is_refused(
+def test_invalid_fault_is_refused(
     runtime: Path, config: Callable[..., Any], wanted: dict[str, Any], words: str
 ) -> None:
     with Supervisor(config(), None, 10) as supervisor, pytest.raises(UserError, match=words):
         supervisor.faults.handle("add", wanted)
 
 
-def test_rows_that_a_stalled_recorder_has_no_room_for_are_counted_one_by_one(
+def test_rows_lost_by_a_stalled_recorder_are_counted_exactly(
     runtime: Path, config: Callable[..., Any], tmp_path: Path
 ) -> None:
     ticks = 4000
@@ -87,7 +87,7 @@ def test_rows_that_a_stalled_recorder_has_no_room_for_are_counted_one_by_one(
     assert np.array_equal(np.concatenate(gaps), missing)
 
 
-def test_a_run_that_ends_in_the_middle_of_a_stall_is_whole(
+def test_run_that_ends_during_a_recorder_stall_keeps_all_rows(
     runtime: Path, config: Callable[..., Any], tmp_path: Path
 ) -> None:
     settings = config(set={"faults": [{"fault": "recorder.stall", "at": 1.0}, {"fault": "cpu.hog", "size": 1}]})
@@ -102,7 +102,7 @@ def test_a_run_that_ends_in_the_middle_of_a_stall_is_whole(
 # CPU hogs
 
 
-def test_a_hog_ends_with_whoever_started_it_even_by_sigkill() -> None:
+def test_cpu_hog_ends_with_its_parent_also_after_sigkill() -> None:
     text = f"import subprocess, sys, time; p = subprocess.Popen([sys.executable, '-S', '-c', {BUSY!r}], " \
            "stdin=subprocess.PIPE); print(p.pid, flush=True); time.sleep(100)"  # fmt: skip
     with subprocess.Popen([sys.executable, "-c", text], stdout=subprocess.PIPE, text=True) as parent:
@@ -116,7 +116,7 @@ def test_a_hog_ends_with_whoever_started_it_even_by_sigkill() -> None:
 # the wall clock
 
 
-ALLOWED = {  # what is to carry a date does
+ALLOWED = {  # modules that write dates
     "daemon/captures.py": {"now"}, "trace/recorder.py": {"now"}, "trace/rotation.py": {"now"}, "cli/common.py": {"now"},
 }  # fmt: skip
 
@@ -130,14 +130,14 @@ def wall_clock(path: Path) -> set[str]:
 
 
 @pytest.mark.parametrize("folder", ["loop", "daemon", "trace", "laws", "machines"])
-def test_nothing_but_a_date_depends_on_the_wall_clock(folder: str) -> None:
+def test_only_dates_depend_on_the_wall_clock(folder: str) -> None:
     root = Path(rtctl.__file__).parent
     for path in (root / folder).rglob("*.py"):
         where = path.relative_to(root).as_posix()
         assert wall_clock(path) <= ALLOWED.get(where, set()), where
 
 
-def test_the_clock_is_as_it_was_once_the_step_has_passed(runtime: Path, config: Callable[..., Any]) -> None:
+def test_clock_step_fault_restores_the_clock_afterwards(runtime: Path, config: Callable[..., Any]) -> None:
     settings = config(set={"faults": [{"fault": "clock.step", "at": 0.1, "lasts": 0.1, "size": -1e6}]})
     before = time.time
     with Supervisor(settings, None, 200) as supervisor:
@@ -151,5 +151,5 @@ def test_the_clock_is_as_it_was_once_the_step_has_passed(runtime: Path, config: 
 
 
 @pytest.mark.realtime
-def test_a_plant_that_was_killed_comes_back_over_zmq(runtime: Path, tmp_path: Path) -> None:
+def test_killed_plant_reconnects_over_zmq(runtime: Path, tmp_path: Path) -> None:
     assert processes.plant_back(STANDS["ivu"], tmp_path, "zmq").ok

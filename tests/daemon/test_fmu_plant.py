@@ -1,4 +1,4 @@
-"""What stands between an FMU and the loop: volts with their sign to its drives, counts and codes from its sensors."""
+"""Adapter between an FMU and the loop: signed volts to its drives, counts and codes from its sensors."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ STEP = 20 / 4096
 
 
 class Scripted:
-    """In an FMU's place: shows what a test says, and remembers the volts."""
+    """Stub of an FMU: outputs the readings of the test and records the volts."""
 
     def __init__(self, settings, drives, sensors, dt):
         self.readings = [0.0] * len(sensors)
@@ -44,7 +44,7 @@ def plant(config, monkeypatch):
 
 
 def tick(plant, readings, codes, lines=0):
-    """One tick with these codes, after which the FMU shows `readings`; the sample that follows."""
+    """Run one tick with output `codes`; the FMU then outputs `readings`. Returns the next sample."""
     plant.fmu.next = readings
     plant.end.tx["ao_codes"][: len(codes)] = codes
     plant.end.tx["dio_lines"], plant.end.tx["state"] = lines, safety.RUNNING
@@ -53,16 +53,16 @@ def tick(plant, readings, codes, lines=0):
     return plant.end.rx
 
 
-def test_the_ivu_has_two_drives_a_capstan_and_two_reels(plant):
+def test_fmu_of_the_ivu_has_two_drives_a_capstan_encoder_and_two_reel_sensors(plant):
     ivu = plant("ivu")
     sensor, half = 2 * np.pi / 209, 2.5 / 10 * 4096
     seen = tick(ivu, [2 * np.pi / 100, 0.5 * sensor, 0.0], (100, -200))
     assert ivu.fmu.volts == [[100 * STEP, -200 * STEP]]
     assert seen["counter_codes"][0] - daq_stc.INITIAL_COUNT == pytest.approx(100, abs=1)
-    assert (seen["ai_codes"][0] < half) != (seen["ai_codes"][1] < half)  # one reel dark, the other light
+    assert (seen["ai_codes"][0] < half) != (seen["ai_codes"][1] < half)  # one reel sensor dark, the other light
 
 
-def test_the_direction_bit_gives_the_ldus_volts_their_sign(plant):
+def test_direction_bit_sets_the_sign_of_the_ldu_volts(plant):
     ldu = plant("ldu")
     tick(ldu, [0.0, 0.0], (100,), lines=1)
     seen = tick(ldu, [-2 * np.pi / 400, 1e-5 + 1e-7], (100,), lines=0)
@@ -70,7 +70,7 @@ def test_the_direction_bit_gives_the_ldus_volts_their_sign(plant):
     assert [int(c) - daq_stc.INITIAL_COUNT for c in seen["counter_codes"][:2]] == pytest.approx([-50, 20], abs=1)
 
 
-def test_the_axis_counts_its_scale_both_ways(plant):
+def test_linear_scale_of_the_axis_counts_in_both_directions(plant):
     axis = plant("axis")
     assert tick(axis, [5.5e-6], (0,))["counter_codes"][0] == daq_stc.INITIAL_COUNT + 5
     assert tick(axis, [-2.5e-6], (0,))["counter_codes"][0] == daq_stc.INITIAL_COUNT - 3
@@ -86,6 +86,6 @@ def test_the_axis_counts_its_scale_both_ways(plant):
         ("lockstep", {"driver.kind": "comedi", "plant.fmu": ANY}, "a machine is real or a model"),
     ],
 )
-def test_what_cannot_run_in_its_time_is_refused(config, kind, mode, change, words):
+def test_plant_that_does_not_support_the_loop_mode_is_refused(config, kind, mode, change, words):
     with pytest.raises((ValueError, UserError), match=words):
         check_plant(config(kind, mode=mode, set=change))

@@ -15,7 +15,7 @@ TCP = "tcp://127.0.0.1:*"
 
 @pytest.fixture
 def keys(tmp_path):
-    """A folder with a server and the clients alice, who is let in, and mallory, who is not."""
+    """A folder with the keys of a server, of alice (authorized) and of mallory (not authorized)."""
     for name in ("server", "alice", "mallory"):
         new_keys(name, tmp_path)
     shutil.copy(tmp_path / "alice.key", tmp_path / "authorized")
@@ -30,7 +30,7 @@ def far():
     context.destroy(linger=0)
 
 
-def test_secrets_are_for_the_owner(tmp_path):
+def test_secret_key_file_is_readable_by_its_owner_only(tmp_path):
     old = os.umask(0)
     try:
         public, secret = new_keys("server", tmp_path)
@@ -48,21 +48,21 @@ def test_keys_are_never_overwritten(keys):
     assert load_keys("server", keys) == before
 
 
-def test_a_secret_that_others_can_read_is_refused(keys):
+def test_secret_key_readable_by_others_is_refused(keys):
     (keys / "alice.key_secret").chmod(0o640)
     with pytest.raises(UserError, match=r"mode 0640.*chmod 600"):
         load_keys("alice", keys)
 
 
 @pytest.mark.parametrize("text", ["", "public-key = 'short'", 'public-key = "' + "~" * 40 + '"'])
-def test_damaged_keys(keys, text):
+def test_damaged_key_file_is_refused(keys, text):
     path = keys / "alice.key_secret"
     path.write_text(text)
     with pytest.raises(UserError, match=r"alice\.key_secret"):
         load_keys("alice", keys)
 
 
-def test_missing_keys_say_how_to_make_them(tmp_path):
+def test_missing_keys_error_says_how_to_make_them(tmp_path):
     with pytest.raises(UserError, match="rtctl keys new bob"):
         load_keys("bob", tmp_path)
     new_keys("server", tmp_path)
@@ -92,11 +92,11 @@ def test_missing_keys_say_how_to_make_them(tmp_path):
         ("", True),
     ],
 )
-def test_who_needs_keys(endpoint, required):
+def test_endpoints_beyond_the_loopback_require_keys(endpoint, required):
     assert require_curve(endpoint) is required
 
 
-def test_a_known_client_is_let_in_and_others_are_not(serving, keys, far):
+def test_only_an_authorized_client_of_the_true_server_is_answered(serving, keys, far):
     curve = server_curve(keys)
     alice, mallory = client_curve("alice", keys), client_curve("mallory", keys)
     with serving(TCP, curve=curve) as server:
@@ -117,7 +117,7 @@ def test_a_known_client_is_let_in_and_others_are_not(serving, keys, far):
         assert (server.accepted, server.refused) == (2, {})
 
 
-def test_sockets_of_one_context_have_lists_of_their_own(serving, keys, far):
+def test_two_servers_of_one_context_have_separate_authorized_lists(serving, keys, far):
     shutil.copy(keys / "mallory.key", keys / "authorized")
     both = server_curve(keys)
     (keys / "authorized/alice.key").unlink()
@@ -130,7 +130,7 @@ def test_sockets_of_one_context_have_lists_of_their_own(serving, keys, far):
             client.call("ping")
 
 
-def test_a_context_with_keys_ends_cleanly(keys, echo):
+def test_context_with_keys_terminates_cleanly(keys, echo):
     code = f"""
 import zmq
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The lock of a machine: who holds it, and what a holder that died leaves."""
+"""Lock file of a machine: its holder, and the lock of a killed holder."""
 
 import errno
 import os
@@ -33,14 +33,16 @@ def holder(path: Path) -> subprocess.Popen:
     return made
 
 
-def test_it_is_there_with_the_pid_while_it_is_held(tmp_path: Path) -> None:
+def test_held_lock_file_contains_the_pid_and_is_removed_afterwards(tmp_path: Path) -> None:
     path = tmp_path / "ivu.lock"
     with MachineLock(path, "ivu"):
         assert path.read_text() == f"{os.getpid()}\n" and path.stat().st_mode & 0o777 == 0o600
     assert not path.exists()
 
 
-def test_a_lock_that_a_full_disk_does_not_take_is_given_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_lock_is_released_when_a_full_disk_prevents_writing_the_pid(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def full(*_: object) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
@@ -53,7 +55,7 @@ def test_a_lock_that_a_full_disk_does_not_take_is_given_back(tmp_path: Path, mon
         assert path.read_text() == f"{os.getpid()}\n"
 
 
-def test_a_second_holder_is_refused_with_the_pid_and_leaves_the_first_alone(tmp_path: Path) -> None:
+def test_second_holder_is_refused_with_the_pid_of_the_first(tmp_path: Path) -> None:
     path = tmp_path / "ivu.lock"
     with holder(path) as first:
         for _ in range(2):
@@ -64,7 +66,7 @@ def test_a_second_holder_is_refused_with_the_pid_and_leaves_the_first_alone(tmp_
         pass
 
 
-def test_the_lock_of_a_killed_holder_is_free(tmp_path: Path) -> None:
+def test_lock_of_a_killed_holder_is_free(tmp_path: Path) -> None:
     path = tmp_path / "ivu.lock"
     with holder(path) as first:
         first.send_signal(signal.SIGKILL)
@@ -73,24 +75,24 @@ def test_the_lock_of_a_killed_holder_is_free(tmp_path: Path) -> None:
         assert path.read_text() == f"{os.getpid()}\n"
 
 
-def test_a_pid_that_lives_again_does_not_count(tmp_path: Path) -> None:
+def test_reused_pid_in_the_lock_file_does_not_block_the_lock(tmp_path: Path) -> None:
     path = tmp_path / "ivu.lock"
-    path.write_text(f"{os.getppid()}\n")  # somebody lives under that number, and holds nothing
+    path.write_text(f"{os.getppid()}\n")  # pid of a live process that does not hold the lock
     with MachineLock(path, "ivu"):
         assert path.read_text() == f"{os.getpid()}\n"
 
 
-def test_a_longer_old_content_is_replaced_as_a_whole(tmp_path: Path) -> None:
+def test_longer_old_content_of_the_lock_file_is_replaced(tmp_path: Path) -> None:
     path = tmp_path / "ivu.lock"
     path.write_text("1234567890 and more\n")
     with MachineLock(path, "ivu"):
         assert path.read_text() == f"{os.getpid()}\n"
 
 
-def test_a_file_that_is_removed_between_opening_and_locking_is_not_held(
+def test_lock_file_removed_between_opening_and_locking_is_created_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Else two daemons could hold a lock each: one on the file at the path, one on the file that was there."""
+    """Otherwise two daemons could each hold a lock: one on the removed file, one on the new file."""
     path = tmp_path / "ivu.lock"
     real, removed = lock.fcntl.flock, []
 
@@ -107,7 +109,7 @@ def test_a_file_that_is_removed_between_opening_and_locking_is_not_held(
             MachineLock(path, "ivu").__enter__()
 
 
-def test_leaving_does_not_remove_the_file_of_another(tmp_path: Path) -> None:
+def test_release_does_not_remove_the_lock_file_of_another_holder(tmp_path: Path) -> None:
     path = tmp_path / "ivu.lock"
     with MachineLock(path, "ivu"):
         path.unlink()
@@ -116,7 +118,7 @@ def test_leaving_does_not_remove_the_file_of_another(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("trap", ["folder", "link", "no folder"])
-def test_what_cannot_be_a_lock_is_told(tmp_path: Path, trap: str) -> None:
+def test_path_that_cannot_be_a_lock_file_is_an_error(tmp_path: Path, trap: str) -> None:
     path = tmp_path / "ivu.lock"
     if trap == "folder":
         path.mkdir()
@@ -129,7 +131,7 @@ def test_what_cannot_be_a_lock_is_told(tmp_path: Path, trap: str) -> None:
     assert not (tmp_path / "elsewhere").exists()
 
 
-def test_a_file_system_without_locks_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_file_system_without_locks_is_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def none(fd: int, how: int) -> None:
         raise OSError(37, "No locks available")
 
@@ -140,7 +142,7 @@ def test_a_file_system_without_locks_is_told(tmp_path: Path, monkeypatch: pytest
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can become another user")
 @pytest.mark.parametrize("trap", ["read-only folder", "file of root"])
-def test_another_user_is_told_whose_it_is(runtime: Path, trap: str) -> None:
+def test_lock_error_for_another_user_names_the_owner(runtime: Path, trap: str) -> None:
     nobody = pwd.getpwnam("nobody").pw_uid
     folder = runtime / trap.replace(" ", "-")
     folder.mkdir()
@@ -155,7 +157,7 @@ def test_another_user_is_told_whose_it_is(runtime: Path, trap: str) -> None:
 
 
 def as_user(uid: int, runtime: Path, path: Path) -> str:
-    """What MachineLock says to somebody else, in a process that has imported everything before it changed its user."""
+    """Message of MachineLock in a forked process of another user; the imports precede the change of user."""
     mode = runtime.stat().st_mode
     runtime.chmod(0o755)
     read, write = os.pipe()

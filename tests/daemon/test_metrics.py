@@ -1,4 +1,4 @@
-"""Prometheus: what is counted is what the machine counted, and nobody but this machine may ask."""
+"""Prometheus metrics: values are the counters of the machine, served to this host only."""
 
 import socket
 import threading
@@ -36,7 +36,7 @@ def read(port: int) -> dict[str, dict[tuple[tuple[str, str], ...], float]]:
     return out
 
 
-def test_it_tells_what_the_machine_counts(runtime: Path, config: Callable[..., Any], tmp_path: Path) -> None:
+def test_metrics_equal_the_counters_of_the_machine(runtime: Path, config: Callable[..., Any], tmp_path: Path) -> None:
     port = free_port()
     with Supervisor(config(set={"metrics.port": port}), tmp_path / "run", TICKS) as machine:
         for _ in machine.run():
@@ -54,7 +54,7 @@ def test_it_tells_what_the_machine_counts(runtime: Path, config: Callable[..., A
         read(port)
 
 
-def test_who_only_connects_takes_a_place_and_no_more(runtime: Path, config: Callable[..., Any]) -> None:
+def test_idle_connections_beyond_the_limit_are_closed(runtime: Path, config: Callable[..., Any]) -> None:
     port = free_port()
     before = threading.active_count()
     with Supervisor(config(set={"metrics.port": port}), None, TICKS) as machine:
@@ -68,7 +68,7 @@ def test_who_only_connects_takes_a_place_and_no_more(runtime: Path, config: Call
             pass
 
 
-def test_a_port_that_is_taken_is_named(runtime: Path, config: Callable[..., Any]) -> None:
+def test_metrics_port_in_use_is_named_in_the_error(runtime: Path, config: Callable[..., Any]) -> None:
     with socket.socket() as taken:
         taken.bind((metrics.ADDRESS, 0))
         taken.listen()
@@ -80,7 +80,7 @@ def test_a_port_that_is_taken_is_named(runtime: Path, config: Callable[..., Any]
             pass
 
 
-def test_buckets_are_cumulative_and_hold_all_that_was_counted() -> None:
+def test_histogram_buckets_are_cumulative_and_complete() -> None:
     h = np.zeros(1, histogram.HISTOGRAM)[0]
     times = np.random.default_rng(1).lognormal(8.0, 2.0, 5000).astype(int)
     for ns in times:

@@ -10,7 +10,7 @@ MS = 1_000_000  # ns
 
 
 class Manager:
-    """What was sent, and a clock in ns that the test moves. `deaf` takes nothing."""
+    """Stub of the service manager: sent messages, and a clock (ns) set by the test. `deaf` refuses messages."""
 
     def __init__(self) -> None:
         self.said: list[str] = []
@@ -34,7 +34,7 @@ def manager() -> Manager:
 # ready
 
 
-def test_ready_after_enough_good_ticks_and_once(manager: Manager) -> None:
+def test_ready_is_sent_once_after_enough_good_ticks(manager: Manager) -> None:
     service = manager.service()
     for tick in (0, 40, 99):
         service.observe(tick, 0)
@@ -45,7 +45,7 @@ def test_ready_after_enough_good_ticks_and_once(manager: Manager) -> None:
     assert manager.said == ["READY=1"]
 
 
-def test_a_late_tick_begins_the_count_again(manager: Manager) -> None:
+def test_late_tick_restarts_the_count_of_good_ticks(manager: Manager) -> None:
     service = manager.service()
     service.observe(90, 0)
     service.observe(100, 1)
@@ -58,7 +58,7 @@ def test_a_late_tick_begins_the_count_again(manager: Manager) -> None:
     assert manager.said == ["READY=1"]
 
 
-def test_a_loop_that_never_ticks_is_never_ready(manager: Manager) -> None:
+def test_loop_that_never_ticks_is_never_ready(manager: Manager) -> None:
     service = manager.service(watchdog=2000)
     for _ in range(100):
         manager.now += 10 * MS
@@ -67,14 +67,14 @@ def test_a_loop_that_never_ticks_is_never_ready(manager: Manager) -> None:
 
 
 @pytest.mark.parametrize(("rate", "good"), [(10_000.0, GOOD_TICKS), (500.0, GOOD_TICKS), (20.0, 20), (0.2, 1)])
-def test_good_ticks_are_a_hundred_or_a_second(rate: float, good: int) -> None:
+def test_required_good_ticks_are_a_hundred_or_one_second_of_ticks(rate: float, good: int) -> None:
     assert from_environment({}, rate).good_ticks == good
 
 
-# signs of life
+# watchdog
 
 
-def test_fed_at_half_of_the_time_and_only_when_the_counter_moves(manager: Manager) -> None:
+def test_watchdog_is_fed_at_half_its_time_and_only_when_the_tick_counter_moves(manager: Manager) -> None:
     service = manager.service(watchdog=200_000)
     start = manager.now
 
@@ -86,20 +86,20 @@ def test_fed_at_half_of_the_time_and_only_when_the_counter_moves(manager: Manage
     assert feed(99, 50) == 0  # too early
     assert feed(100, 51) == 1
     assert feed(150, 70) == 1
-    assert feed(200, 51) == 1  # it has not moved since the last sign of life
+    assert feed(200, 51) == 1  # the counter has not changed since the last watchdog message
     assert feed(900, 51) == 1
-    assert feed(901, 52) == 2  # and as soon as it does
+    assert feed(901, 52) == 2  # the counter has changed
     assert set(manager.said) == {"WATCHDOG=1"}
 
 
-def test_no_sign_of_life_where_none_is_asked_for(manager: Manager) -> None:
+def test_no_watchdog_message_without_a_watchdog(manager: Manager) -> None:
     service = manager.service(watchdog=0)
     manager.now += 1000 * MS
     service.feed(7)
     assert manager.said == []
 
 
-def test_a_sign_of_life_that_was_not_taken_is_sent_again(manager: Manager) -> None:
+def test_refused_watchdog_message_is_sent_again(manager: Manager) -> None:
     service = manager.service(watchdog=200_000)
     manager.now += 100 * MS
     manager.deaf = True
@@ -112,7 +112,7 @@ def test_a_sign_of_life_that_was_not_taken_is_sent_again(manager: Manager) -> No
 # reload, stop, status
 
 
-def test_reload_carries_the_time_in_microseconds(manager: Manager) -> None:
+def test_reload_message_carries_the_time_in_microseconds(manager: Manager) -> None:
     service = manager.service()
     service.ready()
     manager.now = 123_456_789
@@ -121,7 +121,7 @@ def test_reload_carries_the_time_in_microseconds(manager: Manager) -> None:
     assert manager.said[1:] == ["RELOADING=1\nMONOTONIC_USEC=123456", "READY=1\nSTATUS=2 values taken over"]
 
 
-def test_a_reload_makes_nothing_ready_and_revives_nothing(manager: Manager) -> None:
+def test_reload_does_not_make_a_starting_or_stopping_service_ready(manager: Manager) -> None:
     service = manager.service()
     service.reloading()
     service.reloaded()
@@ -134,28 +134,28 @@ def test_a_reload_makes_nothing_ready_and_revives_nothing(manager: Manager) -> N
     assert manager.said == ["READY=1", "STOPPING=1"]
 
 
-def test_nothing_becomes_ready_on_the_way_down(manager: Manager) -> None:
+def test_stopping_service_does_not_become_ready(manager: Manager) -> None:
     service = manager.service()
     service.stopping()
     service.observe(1000, 0)
     assert manager.said == ["STOPPING=1"]
 
 
-def test_status_is_one_line_and_said_when_it_changes(manager: Manager) -> None:
+def test_status_is_one_line_and_sent_when_it_changes(manager: Manager) -> None:
     service = manager.service()
     for text in ("idle", "idle", "running\nREADY=1", "", "idle"):
         service.status(text)
     assert manager.said == ["STATUS=idle", "STATUS=running READY=1", "STATUS=idle"]
 
 
-def test_a_manager_that_takes_nothing_stops_nobody(manager: Manager) -> None:
+def test_unresponsive_manager_does_not_block_the_service(manager: Manager) -> None:
     manager.deaf = True
     service = manager.service()
     service.ready("idle")
     service.stopping()
 
 
-def test_without_a_manager_nothing_happens() -> None:
+def test_service_without_a_manager_sends_nothing() -> None:
     service = from_environment({})
     service.observe(1000, 0)
     service.reloading()
@@ -173,17 +173,17 @@ def listener() -> socket.socket:
         yield made
 
 
-def test_a_socket_in_the_file_system(listener: socket.socket, runtime: Path) -> None:
+def test_notify_socket_in_the_file_system(listener: socket.socket, runtime: Path) -> None:
     path = runtime / "notify-file"
     listener.bind(str(path))
     environ = {"NOTIFY_SOCKET": str(path), "WATCHDOG_USEC": "2000000", "WATCHDOG_PID": str(os.getpid()), "HOME": "/"}
     service = from_environment(environ)
-    assert environ == {"HOME": "/"}  # children must not speak for the daemon
+    assert environ == {"HOME": "/"}  # child processes must not notify for the daemon
     service.ready("idle")
     assert listener.recv(100) == b"READY=1\nSTATUS=idle"
 
 
-def test_an_abstract_socket(listener: socket.socket) -> None:
+def test_abstract_notify_socket(listener: socket.socket) -> None:
     name = f"rtctl-test-{os.getpid()}"
     listener.bind(f"\0{name}")
     from_environment({"NOTIFY_SOCKET": f"@{name}"}).ready()
@@ -199,7 +199,7 @@ def test_an_abstract_socket(listener: socket.socket) -> None:
         ({}, False),
     ],
 )
-def test_the_watchdog_of_the_environment(
+def test_watchdog_settings_are_read_from_the_environment(
     listener: socket.socket, environ: dict[str, str], fed: bool, request: pytest.FixtureRequest
 ) -> None:
     name = f"rtctl-test-{os.getpid()}-watchdog"
@@ -212,18 +212,18 @@ def test_the_watchdog_of_the_environment(
     assert listener.recv(100) == (b"WATCHDOG=1" if fed else b"STOPPING=1")
 
 
-def test_an_address_that_nobody_listens_at_is_nobody(tmp_path: Path) -> None:
+def test_notify_socket_without_a_listener_is_ignored(tmp_path: Path) -> None:
     service = from_environment({"NOTIFY_SOCKET": str(tmp_path / "gone")})
     assert not service.listens
     service.ready()
 
 
-def test_a_full_socket_does_not_hold_up_a_sign_of_life(listener: socket.socket) -> None:
+def test_full_notify_socket_does_not_block(listener: socket.socket) -> None:
     name = f"rtctl-test-{os.getpid()}-full"
     listener.bind(f"\0{name}")
     now = [0]
     service = from_environment({"NOTIFY_SOCKET": f"@{name}", "WATCHDOG_USEC": "2"}, clock=lambda: now[0])
-    for tick in range(1, 1000):  # the kernel keeps ten or so
+    for tick in range(1, 1000):  # the kernel queues about ten
         now[0] += MS
         service.feed(tick)
     assert 0 < sum(1 for _ in _waiting(listener)) < 999

@@ -1,4 +1,4 @@
-"""State that two machines have in common goes on in the second one."""
+"""State fields that two machines share are carried over to the second machine."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from rtctl.daemon.onset import carry
 from rtctl.watch.rehearsal import Shift, usual
 
 
-def test_common_fields_are_copied_and_others_stay():
+def test_common_state_fields_are_copied_and_others_stay():
     inner = np.dtype([("x", float, 2), ("v", float)])
     one = np.zeros(1, [("m", inner), ("gone", int), ("kind", np.int32)])
     two = np.zeros(1, [("m", inner), ("new", float), ("kind", np.int64)])
@@ -16,11 +16,11 @@ def test_common_fields_are_copied_and_others_stay():
     two["new"] = 3.0
     carry(one, two)
     np.testing.assert_allclose(two["m"]["x"], [[1.0, 2.0]])
-    assert (two["new"][0], two["kind"][0]) == (3.0, 0)  # another type is another field
+    assert (two["new"][0], two["kind"][0]) == (3.0, 0)  # a field of another type is not copied
 
 
 @pytest.mark.parametrize("physics", [[], [{"term": "friction.viscous", "node": "motor2", "B": 1e-3}]])
-def test_a_machine_goes_on_where_it_was(physics):
+def test_machine_continues_from_the_state_of_its_predecessor(physics):
     from rtctl import api
 
     config = api.load_config("ivu")

@@ -1,4 +1,4 @@
-"""What belongs to whom: what a daemon that was killed leaves to the next one, and what other users may do."""
+"""Ownership of files: what a killed daemon leaves to the next one, and the access rights of other users."""
 
 import json
 import os
@@ -36,7 +36,7 @@ order = json.loads(sys.argv[1])
 config = machines.CONFIGS[order["config"]["machine"]].model_validate(order["config"])
 Session(config, Path(order["out"]), order["length"]).run()
 """
-LONG = 1e6  # s of virtual time: more than it can be through before it is killed
+LONG = 1e6  # s of virtual time; the run is killed long before
 
 
 def wait_for(what: Callable[[], Any], seconds: float = 60.0) -> Any:
@@ -48,12 +48,12 @@ def wait_for(what: Callable[[], Any], seconds: float = 60.0) -> Any:
 
 
 def left(config: Any) -> list[Path]:
-    """All that a machine has in shared memory and in the folder of sockets."""
+    """Files of a machine in shared memory and in the folder of sockets."""
     return [*shared_folder().glob(f"{config.name}.*"), *runtime_dir().glob(f"{config.name}.*")]
 
 
 def gone(pid: int) -> bool:
-    """Whether a process has ended; one that waits to be reaped has."""
+    """Whether a process has ended; a zombie counts as ended."""
     try:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "Z"
     except (FileNotFoundError, ProcessLookupError):
@@ -61,7 +61,7 @@ def gone(pid: int) -> bool:
 
 
 def status_of(path: Path) -> Any:
-    """The loop's counters: they stand first in a segment."""
+    """Counters of the loop: the first block of a segment."""
     return np.memmap(path, STATUS, "r", shape=(1,))[0]
 
 
@@ -70,7 +70,7 @@ SOME_ROWS = 50_000  # bytes
 
 @pytest.fixture
 def killed(runtime: Path, tmp_path: Path) -> Iterator[Callable[[Any], list[int]]]:
-    """`killed(config)` starts a run, kills its supervisor in the middle of it, and gives the pids of its children."""
+    """`killed(config)` starts a run, kills its supervisor during the run and returns the pids of its children."""
     made: list[subprocess.Popen] = []
 
     def kill(config: Any) -> list[int]:
@@ -78,7 +78,7 @@ def killed(runtime: Path, tmp_path: Path) -> Iterator[Callable[[Any], list[int]]
         order = {"config": data, "out": str(tmp_path / "killed"), "length": LONG}
         made.append(subprocess.Popen([sys.executable, "-c", RUN, json.dumps(order)]))
         pid, path = made[-1].pid, segment_path(config.name)
-        wait_for(lambda: path.exists() and path.stat().st_size >= STATUS.itemsize)  # made, then sized
+        wait_for(lambda: path.exists() and path.stat().st_size >= STATUS.itemsize)  # the file is created, then sized
         wait_for(lambda: status_of(path)["tick"] > 1000, 200)
         stream = tmp_path / "killed" / "recording.arrows"
         wait_for(lambda: stream.exists() and stream.stat().st_size > SOME_ROWS)
@@ -95,13 +95,13 @@ def killed(runtime: Path, tmp_path: Path) -> Iterator[Callable[[Any], list[int]]
 
 
 @pytest.mark.parametrize("mode", ["lockstep", "fused"])
-def test_after_sigkill_nothing_runs_on_and_the_next_start_takes_it_all_over(
+def test_after_sigkill_the_children_end_and_the_next_start_takes_over_the_files(
     config: Callable[..., Any], killed: Callable[[Any], list[int]], tmp_path: Path, mode: str
 ) -> None:
     settings = config(mode=mode, link="shm", set={"record.seconds": 2.0, "record.batch": 0.001})
     children = killed(settings)
     wait_for(lambda: all(map(gone, children)), 10)
-    assert {p.suffix for p in left(settings)} >= {".lock", ".command", ".telemetry"}  # nobody was there to clean up
+    assert {p.suffix for p in left(settings)} >= {".lock", ".command", ".telemetry"}  # no cleanup after SIGKILL
     assert segment_path(settings.name) in left(settings)  # with the last seconds of the trace
     assert Session(settings, tmp_path / "next", 2.0).run()["ticks"] == 1000
     assert left(settings) == []
@@ -109,10 +109,10 @@ def test_after_sigkill_nothing_runs_on_and_the_next_start_takes_it_all_over(
     before = load_bundle(tmp_path / "killed").columns
     assert first.rows > 0 and (kept["tick"] == np.arange(1000)).all()
     both = min(first.rows, 1000)
-    assert (before["u1"][:both] == kept["u1"][:both]).all()  # as if the other had never been
+    assert (before["u1"][:both] == kept["u1"][:both]).all()  # the killed run does not affect the next one
 
 
-def test_two_machines_of_other_names_have_nothing_in_common(
+def test_two_machines_with_different_names_share_no_files(
     config: Callable[..., Any], runtime: Path, tmp_path: Path
 ) -> None:
     first, second = config(), config()
@@ -126,7 +126,7 @@ def test_two_machines_of_other_names_have_nothing_in_common(
     assert left(first) == []
 
 
-def test_shared_memory_is_the_owners_alone(tmp_path: Path) -> None:
+def test_shared_memory_is_accessible_to_its_owner_only(tmp_path: Path) -> None:
     before = os.umask(0)
     try:
         made = Segment.create(tmp_path / "segment", {"status": (STATUS, 1)})
@@ -145,7 +145,7 @@ class Nothing:
 
 @pytest.fixture
 def served(runtime: Path) -> Iterator[dict[str, Path]]:
-    """Both sockets as rtctl@.service has them: UMask=0027, in a folder of mode 0750. Paths by socket."""
+    """Both sockets as under rtctl@.service: UMask=0027, in a folder of mode 0750. Paths by socket."""
     folder = runtime / f"service-{time.monotonic_ns()}"
     folder.mkdir()
     folder.chmod(0o750)
@@ -162,15 +162,17 @@ def served(runtime: Path) -> Iterator[dict[str, Path]]:
     context.destroy(linger=0)
 
 
-def test_the_owner_commands_and_the_group_may_only_listen(served: dict[str, Path]) -> None:
-    """Linux asks for the right to write of whoever connects to a socket."""
+def test_command_socket_is_for_the_owner_and_telemetry_also_for_the_group(served: dict[str, Path]) -> None:
+    """On Linux a connection to a unix socket needs write permission."""
     modes = {name: stat.S_IMODE(path.stat().st_mode) for name, path in served.items()}
     assert modes["command"] & 0o222 == 0o200
     assert modes["telemetry"] & 0o222 == 0o220
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can become another user")
-def test_what_another_user_can_connect_to(served: dict[str, Path], runtime: Path) -> None:
+def test_group_member_connects_to_telemetry_only_and_other_users_to_nothing(
+    served: dict[str, Path], runtime: Path
+) -> None:
     nobody = pwd.getpwnam("nobody")
     group = nobody.pw_gid
     for path in (served["command"].parent, *served.values()):

@@ -17,7 +17,7 @@ from rtctl.daemon.protocol import (
 )
 
 GOOD = {"v": 1, "id": 1, "op": "setpoint", "args": {"value": 1.0}}
-INTEGERS = st.integers(-(2**63), 2**64 - 1)  # what msgpack holds
+INTEGERS = st.integers(-(2**63), 2**64 - 1)  # range of msgpack integers
 ANYTHING = st.recursive(
     st.none() | st.booleans() | INTEGERS | st.floats() | st.text() | st.binary(),
     lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text() | st.binary() | INTEGERS, inner, max_size=4),
@@ -40,7 +40,7 @@ def nested(depth):
     return {**GOOD, "op": "set", "args": {"path": "a", "value": value}}
 
 
-def test_what_was_encoded_comes_back_typed():
+def test_encoded_request_decodes_to_typed_arguments():
     request = decode_request(
         encode_request("a-1", "setpoint", {"value": 3, "unit": "m/s^2", "ramp": 2.0, "ramp_unit": "mm/s"})
     )
@@ -60,7 +60,7 @@ def test_args_may_be_left_out():
 @example(b"\xdf\xff\xff\xff\xff")
 @example(b"\xc7\x00\xff")  # a time stamp of no length
 @example(b"\xd6\xff\x00\x00\x00\x00")
-def test_no_bytes_raise_anything_else(data):
+def test_random_bytes_raise_only_protocol_errors(data):
     try:
         decode_request(data)
     except ProtocolError as error:
@@ -75,7 +75,7 @@ def test_no_bytes_raise_anything_else(data):
     st.dictionaries(st.sampled_from(["value", "path", "unit", "ramp", "seconds", "id"]), ANYTHING),
     st.booleans(),
 )
-def test_no_structure_raises_anything_else(message, op, args, plausible):
+def test_random_messages_raise_only_protocol_errors(message, op, args, plausible):
     if plausible and isinstance(message, dict):
         message = {**message, "v": 1, "id": 1, "op": op, "args": args}
     try:
@@ -88,37 +88,37 @@ def test_no_structure_raises_anything_else(message, op, args, plausible):
 
 @settings(deadline=None)
 @given(st.binary(max_size=100) | ANYTHING.map(msgpack.packb))
-def test_no_reply_raises_anything_else(data):
+def test_random_replies_raise_only_protocol_errors(data):
     try:
         decode_reply(data)
     except ProtocolError as error:
         assert error.code in protocol.ERRORS
 
 
-def test_a_foreign_version_is_told_which_are_spoken():
+def test_unknown_version_error_lists_the_supported_versions():
     error = refusal({**GOOD, "v": 2, "novelty": []})
     assert (error.code, error.id) == ("version", 1)
     assert "versions spoken: 1" in error.message
 
 
 @pytest.mark.parametrize("version", [None, True, 1.0, "1"])
-def test_a_version_is_a_whole_number(version):
+def test_version_must_be_an_integer(version):
     assert refusal({**GOOD, "v": version}).code == "malformed"
 
 
-def test_oversize_is_refused_before_it_is_read():
+def test_oversize_message_is_refused_before_decoding():
     assert refusal(b"\xc1" * (protocol.MAX_BYTES + 1)).code == "too_large"
     with pytest.raises(ProtocolError, match="at most 65536"):
         encode_result(1, {"text": "x" * protocol.MAX_BYTES})
 
 
-def test_depth_is_bounded():
+def test_nesting_depth_is_bounded():
     assert decode_request(msgpack.packb(nested(protocol.MAX_DEPTH - 2)))
     assert "nested deeper" in refusal(nested(protocol.MAX_DEPTH - 1)).message
 
 
 @pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf])
-def test_numbers_are_finite(number):
+def test_numbers_must_be_finite(number):
     error = refusal({**GOOD, "args": {"value": number}})
     assert error.code == "malformed"
     assert "'value' is" in error.message
@@ -128,17 +128,17 @@ def test_numbers_are_finite(number):
 @pytest.mark.parametrize(
     "value", [b"bytes", msgpack.Timestamp(0), msgpack.ExtType(4, b"x"), "x" * 20_000, [0] * 5000, {1: 2}]
 )
-def test_types_and_sizes_that_are_not_taken(value):
+def test_unsupported_types_and_sizes_are_refused(value):
     assert refusal({**GOOD, "op": "set", "args": {"path": "a", "value": value}}).code == "malformed"
 
 
-def test_a_key_may_not_stand_twice():
+def test_duplicate_map_key_is_refused():
     pair = msgpack.packb("v") + msgpack.packb(1)
     assert "twice" in refusal(b"\x82" + pair + pair).message
 
 
 @pytest.mark.parametrize("id", [None, True, 1.5, "", "x" * 65, [1]])
-def test_ids_that_are_none(id):
+def test_invalid_request_id_is_refused(id):
     error = refusal({**GOOD, "id": id})
     assert (error.code, error.id) == ("malformed", None)
 
@@ -162,7 +162,7 @@ def test_ids_that_are_none(id):
         ({"op": "capture", "args": {"seconds": 0.0}}, "bad_args", "'seconds'"),
     ],
 )
-def test_mistakes_are_explained(change, code, words):
+def test_error_message_explains_the_mistake(change, code, words):
     error = refusal({**GOOD, **change})
     assert error.code == code
     assert error.id == 1

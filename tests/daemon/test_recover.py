@@ -1,4 +1,4 @@
-"""Rows in the shared memory of a killed daemon come back into its recording, or make one of their own."""
+"""Recovery of rows from the shared memory of a killed daemon, into its bundle or into a new one."""
 
 import json
 import os
@@ -48,7 +48,7 @@ def shm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def killed(bundle: Path | None, head: int = 130, recorded: int | None = 90, ended: bool = False) -> Path:
-    """Segment of a daemon that was killed when its loop had written `head` rows, `recorded` of them into `bundle`."""
+    """Segment of a killed daemon: `head` rows in the ring, `recorded` rows in `bundle`."""
     path = shared_memory.segment_path("ivu")
     segment = Segment.create(path, {"status": (STATUS, 1), "ring": (RING, 1), "rows": (ROW, CAPACITY)})
     segment["status"][0]["ended"] = ended
@@ -69,7 +69,7 @@ def ticks(folder: Path) -> list[int]:
     return [int(tick) for tick in found["tick"]]
 
 
-def test_rows_after_the_last_recorded_one_are_joined(shm: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_unrecorded_rows_are_joined_to_the_bundle(shm: Path, capsys: pytest.CaptureFixture[str]) -> None:
     bundle = Path("run").absolute()
     killed(bundle)
     assert main(["trace", "recover", "ivu"]) == 0
@@ -83,7 +83,7 @@ def test_rows_after_the_last_recorded_one_are_joined(shm: Path, capsys: pytest.C
         recover("ivu")
 
 
-def test_a_recording_that_was_repaired_before_is_joined_too() -> None:
+def test_unrecorded_rows_are_joined_to_a_repaired_bundle() -> None:
     from rtctl.trace.repair import repair
 
     killed(Path("run").absolute())
@@ -91,8 +91,8 @@ def test_a_recording_that_was_repaired_before_is_joined_too() -> None:
     assert recover("ivu")[0][0].rows == 40 and ticks(Path("run")) == list(range(130))
 
 
-def test_rows_that_are_in_neither_are_told() -> None:
-    """The ring has overflowed: its oldest row may be torn, since the loop was killed while it wrote."""
+def test_rows_lost_between_recording_and_ring_are_reported() -> None:
+    """The ring has overflowed. Its oldest row may be half overwritten and is not recovered."""
     killed(Path("run").absolute(), head=250, recorded=90)
     done = recover("ivu")[0][0]
     assert (done.rows, done.ticks, done.lost) == (99, (151, 249), 61)
@@ -100,13 +100,13 @@ def test_rows_that_are_in_neither_are_told() -> None:
     assert ticks(Path("run")) == [*range(90), *range(151, 250)]
 
 
-def test_a_loop_that_has_ended_left_no_torn_row() -> None:
+def test_ended_loop_leaves_no_torn_row_in_the_ring() -> None:
     killed(None, head=250, ended=True)
     assert recover("ivu", Path("here"))[0][0].ticks == (150, 249)
 
 
 @pytest.mark.parametrize("why", ["never", "deleted", "another"])
-def test_rows_without_their_recording_make_a_bundle(why: str) -> None:
+def test_rows_without_a_matching_bundle_make_a_new_one(why: str) -> None:
     bundle = Path("run").absolute()
     killed(None if why == "never" else bundle, recorded=None)
     if why == "another":
@@ -120,7 +120,7 @@ def test_rows_without_their_recording_make_a_bundle(why: str) -> None:
     assert before == ({path: path.read_bytes() for path in bundle.iterdir()} if bundle.exists() else {})
 
 
-def test_a_recording_that_was_moved_is_named(tmp_path: Path) -> None:
+def test_moved_bundle_can_be_given_as_an_argument(tmp_path: Path) -> None:
     killed(tmp_path / "run")
     (tmp_path / "run").rename(tmp_path / "moved")
     assert recover("ivu", tmp_path / "moved")[0][0].bundle == tmp_path / "moved"
@@ -128,14 +128,14 @@ def test_a_recording_that_was_moved_is_named(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("recorded", [0, None])
-def test_a_recording_without_a_row_takes_all(tmp_path: Path, recorded: int | None) -> None:
+def test_all_rows_are_recovered_into_an_empty_bundle(tmp_path: Path, recorded: int | None) -> None:
     killed(tmp_path / "run", head=60, recorded=0)
-    if recorded is None:  # killed before the list of columns was written
+    if recorded is None:  # killed before the schema was written
         os.truncate(tmp_path / "run" / "recording.arrows", 3)
     assert recover("ivu")[0][0].rows == 60 and ticks(tmp_path / "run") == list(range(60))
 
 
-def test_parts_grow_at_the_end(tmp_path: Path) -> None:
+def test_recovered_rows_extend_the_last_part_of_a_rotated_bundle(tmp_path: Path) -> None:
     from rtctl.trace.recorder import Recorder
 
     run = Recorder(tmp_path / "run", COLUMNS, ROW, CASE, rotation=Rotation(minutes=0.1 / 60))  # 50 rows
@@ -155,7 +155,7 @@ def test_parts_grow_at_the_end(tmp_path: Path) -> None:
     assert [part["rows"] for part in case["parts"]] == [50, 80] and case["rows"] == 130
 
 
-def test_what_the_disk_does_not_take_stays_in_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_segment_is_kept_when_the_disk_is_full(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = killed(tmp_path / "run")
     with monkeypatch.context() as patch:
         patch.setattr("rtctl.trace.join.write", lambda *_, **__: (_ for _ in ()).throw(OSError(28, "No space left")))
@@ -164,7 +164,7 @@ def test_what_the_disk_does_not_take_stays_in_memory(tmp_path: Path, monkeypatch
     assert len(shared_memory.kept("ivu")) == 1 and recover("ivu")[0][0].rows == 40
 
 
-def test_a_daemon_that_runs_keeps_its_segment_and_gives_those_before(tmp_path: Path) -> None:
+def test_running_daemon_keeps_its_segment_while_older_segments_are_recovered(tmp_path: Path) -> None:
     killed(tmp_path / "first")
     shared_memory.put_aside("ivu")
     path = killed(tmp_path / "second")
@@ -180,7 +180,7 @@ def test_a_daemon_that_runs_keeps_its_segment_and_gives_those_before(tmp_path: P
     assert path.exists() and recover("ivu")[0][0].bundle == tmp_path / "second"
 
 
-def test_a_loop_that_still_runs_is_waited_for_and_then_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_recovery_waits_for_a_running_loop_and_then_refuses(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(leftover, "ENDING", 0.05)
     killed(tmp_path / "run")
     shared_memory.put_aside("ivu")
@@ -196,7 +196,7 @@ def test_a_loop_that_still_runs_is_waited_for_and_then_refused(tmp_path: Path, m
 
 
 @pytest.mark.parametrize("name", ["../ivu", "*", ""])
-def test_a_name_is_no_path(name: str) -> None:
+def test_machine_name_that_is_a_path_is_refused(name: str) -> None:
     with pytest.raises(UserError, match="is no machine's name"):
         recover(name)
 
@@ -225,7 +225,7 @@ with supervisor:
 """
 
 
-def test_a_killed_process_group_loses_no_row(runtime: Path, config: Callable[..., Any], tmp_path: Path) -> None:
+def test_kill_of_the_process_group_loses_no_row(runtime: Path, config: Callable[..., Any], tmp_path: Path) -> None:
     settings = config(set={"record.seconds": 2.0})
     data = {"config": settings.model_dump(mode="json", exclude_unset=True), "out": str(tmp_path / "run")}
     child = subprocess.Popen(
@@ -247,8 +247,8 @@ def test_a_killed_process_group_loses_no_row(runtime: Path, config: Callable[...
         np.testing.assert_array_equal(found[name], truth[name][:count], err_msg=name)
 
 
-def test_the_lock_is_free_while_rows_are_recovered(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A service that starts again at once is not refused."""
+def test_machine_lock_is_free_during_recovery(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A service that restarts at once is not refused."""
     from rtctl.trace import join
 
     killed(tmp_path / "run")

@@ -1,4 +1,4 @@
-"""A config that is read again: what is taken over, what is refused, and that nothing happens by halves."""
+"""Config reload: which changes are applied, which are refused, and all of them at one tick."""
 
 from collections.abc import Callable
 from typing import Any
@@ -13,7 +13,7 @@ from rtctl.daemon.reload import differences, mixed, reload
 
 
 class Supervisor:
-    """As much of one as a reload sees."""
+    """Stub of a supervisor for `reload`."""
 
     def __init__(self, config: Any):
         self.config, self.machine, self.link = config, machines.build(config), "shm"
@@ -30,8 +30,7 @@ class Supervisor:
 
 @pytest.fixture
 def supervised(config: Callable[..., Any]) -> Callable[..., tuple[Supervisor, Any]]:
-    """`supervised("ivu", {...})` is a supervisor and the settings that its file has by now; the last argument are
-    settings that it had at the start."""
+    """`supervised("ivu", {...}, start)`: a supervisor started with the settings `start`, and the changed config."""
 
     def make(kind: str, values: dict[str, Any], start: dict[str, Any] | None = None) -> tuple[Supervisor, Any]:
         settings = config(kind, set=start)
@@ -40,13 +39,13 @@ def supervised(config: Callable[..., Any]) -> Callable[..., tuple[Supervisor, An
     return make
 
 
-def test_nothing_changed_does_nothing(supervised: Callable[..., Any]) -> None:
+def test_reload_of_an_unchanged_config_does_nothing(supervised: Callable[..., Any]) -> None:
     supervisor, fresh = supervised("ivu", {})
     assert reload(supervisor, fresh) == ([], [])
     assert supervisor.taken == 0
 
 
-def test_gains_and_limits_go_over_together_and_the_rest_is_refused(supervised: Callable[..., Any]) -> None:
+def test_reload_applies_gains_and_limits_at_one_tick_and_refuses_the_rest(supervised: Callable[..., Any]) -> None:
     values = {"law.position.gain": 20.0, "safety.current": 0.5, "loop.rate": 250.0, "record.seconds": 5.0}
     supervisor, fresh = supervised("ivu", values)
     taken, refused = reload(supervisor, fresh)
@@ -54,14 +53,14 @@ def test_gains_and_limits_go_over_together_and_the_rest_is_refused(supervised: C
     assert refused == [
         f"{path} cannot change while the machine runs; restart it" for path in ("loop.rate", "record.seconds")
     ]
-    assert supervisor.taken == 1  # all at one tick
+    assert supervisor.taken == 1  # all changes at one tick
     config = supervisor.config
     assert (config.law.position.gain, config.safety.current) == (20.0, 0.5)
     assert (config.loop.rate, config.record.seconds) == (500.0, 20.0)
     assert supervisor.changes == [("safety.current", 0.5), ("law.position.gain", 20.0)]
 
 
-def test_another_structure_is_refused_and_what_is_beside_it_taken(supervised: Callable[..., Any]) -> None:
+def test_reload_refuses_a_changed_law_structure_and_applies_the_other_changes(supervised: Callable[..., Any]) -> None:
     values = {"law.position": {"kind": "pd", "gain": 2000.0, "tau_d": 0.01}, "safety.current": 0.2}
     supervisor, fresh = supervised("ldu", values)
     taken, refused = reload(supervisor, fresh)
@@ -70,28 +69,30 @@ def test_another_structure_is_refused_and_what_is_beside_it_taken(supervised: Ca
     assert supervisor.config.law.position.kind == "pi_velocity"
 
 
-def test_another_machine_is_refused_as_a_whole(supervised: Callable[..., Any], config: Callable[..., Any]) -> None:
+def test_reload_refuses_the_config_of_another_machine(
+    supervised: Callable[..., Any], config: Callable[..., Any]
+) -> None:
     supervisor, _ = supervised("ivu", {})
     with pytest.raises(UserError, match="machine: 'axis' instead of 'ivu' needs a restart"):
         reload(supervisor, config("axis"))
     assert supervisor.taken == 0
 
 
-def test_a_second_reload_finds_only_what_is_still_refused(supervised: Callable[..., Any]) -> None:
+def test_second_reload_reports_only_the_refused_changes(supervised: Callable[..., Any]) -> None:
     supervisor, fresh = supervised("ivu", {"law.position.gain": 20.0, "loop.rate": 250.0})
     reload(supervisor, fresh)
     assert reload(supervisor, fresh) == ([], ["loop.rate cannot change while the machine runs; restart it"])
 
 
-def test_values_that_need_each_other_go_together(supervised: Callable[..., Any]) -> None:
-    """Each by itself would have the lower limit above the upper one."""
+def test_reload_applies_interdependent_limits_together(supervised: Callable[..., Any]) -> None:
+    """Either value alone would put the lower limit above the upper limit."""
     live = {"live": {"safety.tension_max": 20.0}}
     supervisor, fresh = supervised("ivu", {**live, "safety.tension_max": 20.0, "safety.tension_min": 10.0}, live)
     taken, refused = reload(supervisor, fresh)
     assert sorted(taken) == ["safety.tension_max", "safety.tension_min"] and refused == []
 
 
-def test_differences_are_paths(config: Callable[..., Any]) -> None:
+def test_differences_of_two_configs_are_setting_paths(config: Callable[..., Any]) -> None:
     old = config("ivu")
     assert differences(old, old) == []
     new = set_paths(

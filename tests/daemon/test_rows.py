@@ -28,12 +28,12 @@ def subscriber(context, out, topic="ivu"):
     socket.subscribe(topic)
     socket.connect(out.endpoint)
     while not out.publish(rows(0, 1)):
-        pass  # the subscription is on its way
+        pass  # the subscription has not arrived yet
     socket.recv_multipart()
     return socket
 
 
-def test_every_row_arrives_to_the_bit_and_says_what_it_is(context, made):
+def test_published_rows_arrive_bit_exact_with_their_dtype(context, made):
     socket = subscriber(context, made)
     sent = rows(7, 5000)
     assert made.publish(sent)
@@ -44,17 +44,17 @@ def test_every_row_arrives_to_the_bit_and_says_what_it_is(context, made):
     assert np.array_equal(np.frombuffer(payload, dtype), sent)
 
 
-def test_nothing_is_sent_where_nobody_listens(made):
+def test_no_rows_are_sent_without_a_subscriber(made):
     assert not made.publish(rows(0, 10))
 
 
-def test_nothing_is_sent_once_the_last_one_has_gone(context, made):
+def test_no_rows_are_sent_after_the_last_subscriber_has_left(context, made):
     subscriber(context, made).close()
     while made.publish(rows(0, 1)):
         pass
 
 
-def test_of_a_run_that_makes_more_the_newest_go(context, made):
+def test_newest_rows_are_sent_when_there_are_too_many(context, made):
     socket = subscriber(context, made)
     made.publish(rows(0, MOST_ROWS + 10))
     _, head, payload = socket.recv_multipart()
@@ -62,6 +62,6 @@ def test_of_a_run_that_makes_more_the_newest_go(context, made):
 
 
 @pytest.mark.parametrize("head", [b"", b"\xff", b"\x80", b"\x83\xa3pid\x01\xa5names\x91\xa1a\xa5types\x90"])
-def test_a_head_that_is_none(head):
+def test_invalid_row_header_is_refused(head):
     with pytest.raises(ValueError, match="not the head"):
         decode(head)

@@ -18,7 +18,7 @@ from rtctl.daemon.server import CommandServer, default_endpoint, find_endpoint, 
 
 @pytest.fixture
 def idle(context, echo, endpoint):
-    """A server that nobody runs: the test calls `process`."""
+    """A command server without a thread: the test calls `process`."""
     made = CommandServer(endpoint, echo, context)
     yield made
     made.close()
@@ -40,7 +40,7 @@ def reply_to(idle, peer):
 
 
 @pytest.mark.parametrize("kind", [zmq.DEALER, zmq.REQ])
-def test_answers_dealer_and_req(idle, context, endpoint, kind):
+def test_server_answers_dealer_and_req_sockets(idle, context, endpoint, kind):
     peer = connected(context, endpoint, kind)
     peer.send(encode_request(5, "get", {"path": "a.b"}))
     reply = reply_to(idle, peer)
@@ -48,7 +48,7 @@ def test_answers_dealer_and_req(idle, context, endpoint, kind):
     assert (idle.accepted, idle.refused) == (1, {})
 
 
-def test_handles_no_more_than_asked(idle, context, endpoint):
+def test_server_handles_at_most_max_messages(idle, context, endpoint):
     peer = connected(context, endpoint)
     for number in range(5):
         peer.send(encode_request(number, "ping", {}))
@@ -72,7 +72,7 @@ def test_handles_no_more_than_asked(idle, context, endpoint):
         ("signals", "too_large", "the result of 'signals' is"),
     ],
 )
-def test_what_the_handler_can_do_wrong(idle, echo, op, code, words):
+def test_handler_failures_become_error_replies(idle, echo, op, code, words):
     reply = decode_reply(idle.answer(encode_request(1, op, {})))
     assert (reply.code, reply.id) == (code, 1)
     assert words in reply.message
@@ -94,12 +94,12 @@ def test_ping_needs_no_handler(idle, echo):
         msgpack.packb
     )
 )
-def test_stays_alive_whatever_comes(idle, data):
+def test_server_survives_malformed_messages(idle, data):
     assert decode_reply(idle.answer(data)).code in {*protocol.ERRORS, ""}
     assert decode_reply(idle.answer(encode_request(1, "ping", {}))).code == ""
 
 
-def test_somewhat_too_large_is_told_so_and_far_too_large_is_cut_off(idle, context, endpoint):
+def test_large_message_is_refused_and_far_too_large_message_closes_the_connection(idle, context, endpoint):
     peer = connected(context, endpoint)
     peer.send(b"x" * (protocol.MAX_BYTES + 1))
     assert reply_to(idle, peer).code == "too_large"
@@ -109,13 +109,13 @@ def test_somewhat_too_large_is_told_so_and_far_too_large_is_cut_off(idle, contex
     assert reply_to(idle, other).code == ""
 
 
-def test_a_message_of_many_parts_is_refused(idle, context, endpoint):
+def test_multipart_message_is_refused(idle, context, endpoint):
     peer = connected(context, endpoint)
     peer.send_multipart([b"a", b"b", encode_request(1, "arm", {})])
     assert reply_to(idle, peer).code == "malformed"
 
 
-def test_replies_to_the_dead_and_the_deaf_do_not_block(idle, context, endpoint, echo):
+def test_replies_to_closed_and_unread_sockets_do_not_block(idle, context, endpoint, echo):
     dead = connected(context, endpoint)
     dead.send(encode_request(1, "status", {}))
     assert idle.socket.poll(5000)
@@ -134,7 +134,7 @@ def test_replies_to_the_dead_and_the_deaf_do_not_block(idle, context, endpoint, 
     assert handled == idle.accepted - 1
 
 
-def test_a_live_daemon_keeps_its_socket(idle, context, echo, endpoint):
+def test_socket_of_a_live_daemon_is_not_taken_over(idle, context, echo, endpoint):
     with pytest.raises(UserError, match=rf"in use by another daemon \(pid {os.getpid()}\)"):
         CommandServer(endpoint, echo, context)
     peer = connected(context, endpoint)
@@ -142,7 +142,7 @@ def test_a_live_daemon_keeps_its_socket(idle, context, echo, endpoint):
     assert reply_to(idle, peer).code == ""
 
 
-def test_a_socket_file_left_by_a_crash_is_replaced(serving, context, endpoint):
+def test_socket_file_left_by_a_crash_is_replaced(serving, context, endpoint):
     with sockets.socket(sockets.AF_UNIX) as crashed:
         crashed.bind(endpoint.removeprefix("ipc://"))
     with serving(endpoint):
@@ -151,14 +151,14 @@ def test_a_socket_file_left_by_a_crash_is_replaced(serving, context, endpoint):
         assert peer.poll(5000)
 
 
-def test_a_file_that_is_no_socket_is_left_alone(context, echo, endpoint, tmp_path):
+def test_file_that_is_not_a_socket_is_kept(context, echo, endpoint, tmp_path):
     (tmp_path / "c").write_text("thesis")
     with pytest.raises(UserError, match="is not a socket"):
         CommandServer(endpoint, echo, context)
     assert (tmp_path / "c").read_text() == "thesis"
 
 
-def test_tcp_in_use_names_the_daemon_or_says_another_program(serving, context, echo):
+def test_tcp_port_in_use_error_names_the_daemon_or_another_program(serving, context, echo):
     with serving("tcp://127.0.0.1:*") as first:
         assert re.fullmatch(r"tcp://127\.0\.0\.1:\d+", first.endpoint)
         with pytest.raises(UserError, match=rf"another daemon \(pid {os.getpid()}\)"):
@@ -178,11 +178,11 @@ def test_tcp_in_use_names_the_daemon_or_says_another_program(serving, context, e
         ("", "is no endpoint"),
         ("ipc://relative", "absolute path"),
         ("ipc://@abstract", "absolute path"),
-        (f"ipc://{Path(__file__)}/c", "cannot be used"),  # below a file, where no user can make a folder
+        (f"ipc://{Path(__file__)}/c", "cannot be used"),  # parent path is a file
         ("ipc:///tmp/" + "x" * 200, "107 is the most"),
     ],
 )
-def test_bad_endpoints(context, echo, endpoint, words):
+def test_invalid_endpoint_is_refused(context, echo, endpoint, words):
     with pytest.raises(UserError, match=words):
         CommandServer(endpoint, echo, context)
 
@@ -191,7 +191,7 @@ def test_bad_endpoints(context, echo, endpoint, words):
 @pytest.mark.parametrize(
     "endpoint", ["tcp://192.0.2.7:9873", "tcp://*:9873", "tcp://eth0:9873", "tcp://plant.local:9873"]
 )
-def test_the_link_off_the_host_needs_keys(context, endpoint, bind):
+def test_link_beyond_the_host_needs_keys(context, endpoint, bind):
     with pytest.raises(UserError, match=r"can be reached from other machines and needs keys: run `rtctl keys new`"):
         link_socket(context, endpoint, bind, 1.0, None)
 
@@ -223,7 +223,7 @@ def test_runtime_dir_of_a_service_and_of_a_user(no_xdg):
 
 
 @pytest.mark.parametrize("trap", ["readable", "link", "file"])
-def test_a_temporary_folder_that_others_may_use_is_refused(no_xdg, trap):
+def test_runtime_dir_in_tmp_that_is_not_private_is_refused(no_xdg, trap):
     mine = no_xdg / f"rtctl-{os.geteuid()}"
     if trap == "readable":
         mine.mkdir()
@@ -237,7 +237,7 @@ def test_a_temporary_folder_that_others_may_use_is_refused(no_xdg, trap):
         runtime_dir()
 
 
-def test_clients_find_the_service_where_the_user_has_no_daemon(monkeypatch, tmp_path):
+def test_client_finds_the_system_service_when_the_user_has_no_daemon(monkeypatch, tmp_path):
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     monkeypatch.setattr(server, "SYSTEM_DIR", tmp_path / "run")
     own = default_endpoint("ivu", "command")
@@ -250,12 +250,12 @@ def test_clients_find_the_service_where_the_user_has_no_daemon(monkeypatch, tmp_
 
 
 @pytest.mark.parametrize("name", ["", "../x", "a/b", ".hidden", "a b"])
-def test_names_that_are_no_file_names(name):
+def test_machine_name_that_is_not_a_file_name_is_refused(name):
     with pytest.raises(UserError, match="cannot name a socket"):
         default_endpoint(name, "command")
 
 
-def test_a_runtime_dir_too_long_for_a_socket(monkeypatch, tmp_path):
+def test_runtime_dir_too_long_for_a_socket_path_is_refused(monkeypatch, tmp_path):
     deep = tmp_path / ("d" * 100)
     deep.mkdir()
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(deep))

@@ -1,4 +1,4 @@
-"""The folder of shared memory: whose it is, and what is kept of killed runs."""
+"""Folder of shared memory: its owner and mode, and the segments kept of killed runs."""
 
 import os
 import pwd
@@ -26,12 +26,12 @@ def shm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / f"rtctl-{os.geteuid()}"
 
 
-def test_it_is_made_private(shm: Path) -> None:
+def test_shared_memory_folder_is_private(shm: Path) -> None:
     assert shared_memory.shared_folder() == shm and shm.stat().st_mode & 0o777 == 0o700
 
 
 @pytest.mark.parametrize("squat", ["file", "link", "open"])
-def test_what_is_not_a_private_folder_is_refused(shm: Path, squat: str) -> None:
+def test_shared_memory_folder_that_is_not_private_is_refused(shm: Path, squat: str) -> None:
     if squat == "file":
         shm.touch()
     elif squat == "link":
@@ -45,7 +45,7 @@ def test_what_is_not_a_private_folder_is_refused(shm: Path, squat: str) -> None:
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can give a folder away")
-def test_a_folder_of_another_user_is_told_with_a_way_on(shm: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_error_for_a_folder_of_another_user_names_the_remedy(shm: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     shm.mkdir(mode=0o700)
     os.chown(shm, pwd.getpwnam("nobody").pw_uid, -1)
     with pytest.raises(UserError, match="belongs to nobody, not to root; set RTCTL_SHM_DIR"):
@@ -54,13 +54,13 @@ def test_a_folder_of_another_user_is_told_with_a_way_on(shm: Path, monkeypatch: 
     assert shared_memory.shared_folder() == shm.parent / "mine"
 
 
-def test_no_folder_for_it_is_told(shm: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_shared_memory_is_an_error(shm: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(shared_memory, "SHM", shm / "missing")
     with pytest.raises(UserError, match="no folder for shared memory here: No such file"):
         shared_memory.shared_folder()
 
 
-def test_memory_that_is_not_there_is_told_at_the_start(shm: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_too_little_shared_memory_is_an_error_at_the_start(shm: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def full(*_: Any) -> None:
         raise OSError(28, "No space left on device")
 
@@ -71,7 +71,7 @@ def test_memory_that_is_not_there_is_told_at_the_start(shm: Path, monkeypatch: p
     assert not path.exists()
 
 
-def test_a_few_segments_are_kept_and_the_oldest_goes(shm: Path) -> None:
+def test_number_of_kept_segments_is_limited_and_the_oldest_is_removed(shm: Path) -> None:
     for n in range(shared_memory.KEPT + 2):
         path = shared_memory.segment_path("ivu")
         Segment.create(path, SHAPE)
@@ -83,10 +83,10 @@ def test_a_few_segments_are_kept_and_the_oldest_goes(shm: Path) -> None:
     assert shared_memory.put_aside("ivu") is None
 
 
-def test_one_lock_whatever_the_folder_of_sockets_is(
+def test_machine_lock_does_not_depend_on_the_folder_of_sockets(
     runtime: Path, config: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The live segment stays: a second start under another XDG_RUNTIME_DIR does not get that far."""
+    """A second start under another XDG_RUNTIME_DIR is refused and leaves the live segment unchanged."""
     settings = config()
     with Supervisor(settings, None, 50) as first:
         inode = first.segment.path.stat().st_ino

@@ -1,4 +1,4 @@
-"""The supervisor with a running machine: who may start it, and what it answers."""
+"""Supervisor with a running machine: refused starts, and replies to commands."""
 
 import os
 import signal
@@ -20,7 +20,7 @@ from rtctl.daemon.shared_memory import segment_path
 from rtctl.daemon.supervisor import Supervisor
 from rtctl.trace.bundle import load_bundle
 
-# a busy machine is no reason to trip
+# safety limits that do not trip on a busy machine
 QUIET = {"safety.missed_ticks": 0, "safety.link_timeout": 5.0, "safety.disagreement": 0.0}
 STUCK = {
     "plant.parameters": {"R1": 0.038, "R2": 0.022, "tau_F1": 9.0, "tau_F2": 9.0, "tau_Fc": 9.0},
@@ -29,7 +29,7 @@ STUCK = {
 
 
 class Live:
-    """A supervisor whose turns are taken in a thread, with a client of its command socket."""
+    """A supervisor that runs in a thread, with a client of its command socket."""
 
     def __init__(self, supervisor: Supervisor):
         self.of = supervisor
@@ -84,10 +84,10 @@ def live(runtime: Path, config: Callable[..., Any], tmp_path: Path) -> Iterator[
         each.of.__exit__()
 
 
-# who may start it
+# refused starts
 
 
-def test_a_second_daemon_of_that_name_is_refused_with_the_pid(live: Callable[..., Live], tmp_path: Path) -> None:
+def test_second_daemon_of_the_same_name_is_refused_with_the_pid(live: Callable[..., Live], tmp_path: Path) -> None:
     first = live()
     with (
         pytest.raises(
@@ -97,11 +97,11 @@ def test_a_second_daemon_of_that_name_is_refused_with_the_pid(live: Callable[...
         Supervisor(first.of.config, tmp_path / "second"),
     ):
         pass
-    assert first.call("status")["ticks"] > 0  # and the first runs on
+    assert first.call("status")["ticks"] > 0  # the first daemon still runs
     assert segment_path(first.of.config.name).exists() and not (tmp_path / "second").exists()
 
 
-def test_a_plant_that_does_not_answer_is_told_within_its_time(
+def test_missing_plant_is_an_error_after_the_link_timeout(
     runtime: Path, config: Callable[..., Any], tmp_path: Path
 ) -> None:
     keys = {"link.endpoint": f"ipc://{tmp_path}/nobody", "link.timeout": 0.5}
@@ -116,7 +116,7 @@ def test_a_plant_that_does_not_answer_is_told_within_its_time(
     assert not segment_path(settings.name).exists() and not (tmp_path / "bundle").exists()  # nothing is left behind
 
 
-def test_a_folder_that_is_taken_is_refused(runtime: Path, config: Callable[..., Any], tmp_path: Path) -> None:
+def test_output_folder_with_a_recording_is_refused(runtime: Path, config: Callable[..., Any], tmp_path: Path) -> None:
     settings = config()
     Session(settings, tmp_path / "bundle", 0.1).run()
     with pytest.raises(UserError, match=r"already holds recording\.parquet; choose another folder"):
@@ -124,11 +124,11 @@ def test_a_folder_that_is_taken_is_refused(runtime: Path, config: Callable[..., 
     assert not segment_path(settings.name).exists()
 
 
-# what it answers
+# replies to commands
 
 
 @pytest.mark.realtime
-def test_arm_setpoint_stop(live: Callable[..., Live]) -> None:
+def test_armed_machine_follows_a_setpoint_and_stops(live: Callable[..., Live]) -> None:
     machine = live()
     assert machine.call("status")["state"] == "idle"
     with pytest.raises(CommandError, match="outputs are off; `rtctl arm` first"):
@@ -142,12 +142,12 @@ def test_arm_setpoint_stop(live: Callable[..., Live]) -> None:
     assert machine.of.snapshot()["trip"] is None
     assert (trace["tick"] == np.arange(len(trace["tick"]))).all()
     outputs = machine.of.segment["outputs"][0]["frame"]
-    assert not outputs["ao_codes"].any() and outputs["state"] == 0  # the last frame that the plant was sent
+    assert not outputs["ao_codes"].any() and outputs["state"] == 0  # the last frame sent to the plant
     assert machine.of.segment["plant_status"][0]["ended"] in (0, 1)
 
 
 @pytest.mark.realtime
-def test_the_outputs_go_off_with_disarm(live: Callable[..., Live]) -> None:
+def test_disarm_switches_the_outputs_off(live: Callable[..., Live]) -> None:
     machine = live()
     machine.call("arm")
     machine.in_state("running")
@@ -159,8 +159,8 @@ def test_the_outputs_go_off_with_disarm(live: Callable[..., Live]) -> None:
 
 
 @pytest.mark.realtime
-def test_a_gain_changes_without_a_jump(live: Callable[..., Live]) -> None:
-    """The machine is held, so that the error stays: without the transfer the command would jump by 1.1 V."""
+def test_gain_change_is_bumpless(live: Callable[..., Live]) -> None:
+    """The machine is held, so the error stays. Without bumpless transfer the command would jump by 1.1 V."""
     machine = live(**STUCK)
     machine.call("arm")
     machine.in_state("running")
@@ -180,7 +180,7 @@ def test_a_gain_changes_without_a_jump(live: Callable[..., Live]) -> None:
     assert abs(trace["capstan_error"][-1]) > 0.09
 
 
-def test_what_cannot_change_while_running_is_refused(live: Callable[..., Live]) -> None:
+def test_setting_that_cannot_change_while_running_is_refused(live: Callable[..., Live]) -> None:
     machine = live()
     gain = machine.call("get", path="law.position.gain")["value"]
     for path, value, words in [
@@ -218,7 +218,7 @@ def test_malformed_messages_do_not_disturb_the_loop(live: Callable[..., Live]) -
 
 
 @pytest.mark.realtime
-def test_a_capture_has_the_rows_around_its_trigger(live: Callable[..., Live], tmp_path: Path) -> None:
+def test_capture_contains_the_rows_around_its_trigger(live: Callable[..., Live], tmp_path: Path) -> None:
     machine = live()
     machine.call("arm")
     machine.in_state("running")
@@ -236,7 +236,7 @@ def test_a_capture_has_the_rows_around_its_trigger(live: Callable[..., Live], tm
     assert all(np.array_equal(rows[n], trace[n][here], equal_nan=True) for n in trace)
 
 
-def test_the_loop_that_dies_is_a_failure_and_its_recording_is_whole(live: Callable[..., Live]) -> None:
+def test_killed_loop_is_a_failure_recorded_in_the_bundle(live: Callable[..., Live]) -> None:
     machine = live()
     os.kill(machine.of.loop.pid, signal.SIGKILL)
     machine.thread.join(10)

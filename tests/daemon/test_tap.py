@@ -1,4 +1,4 @@
-"""A tap sees what the supervisor sees, and changes nothing."""
+"""Tap: a second reader of the ring that does not disturb the supervisor."""
 
 from collections.abc import Callable
 from typing import Any
@@ -14,17 +14,17 @@ def machine(bench: Callable[..., Any], config: Callable[..., Any]) -> Any:
     return bench(config("ivu"), rows=1000)
 
 
-def test_rows_are_those_of_the_supervisor(machine: Any) -> None:
+def test_tap_returns_the_rows_of_the_supervisor(machine: Any) -> None:
     machine.run(0.1)
     tap = Tap(describe(machine.segment))
-    assert len(tap.take()) == 0  # from now on
-    for seconds in (0.02, 1.0, 1.9, 0.4):  # around the end of the ring, and again
+    assert len(tap.take()) == 0  # a tap starts at the newest row
+    for seconds in (0.02, 1.0, 1.9, 0.4):  # the ring wraps around more than once
         rows = machine.run(seconds)
         assert tap.take().tobytes() == rows.tobytes()
     assert tap.lost == 0
 
 
-def test_a_few_columns(machine: Any) -> None:
+def test_tap_returns_selected_columns(machine: Any) -> None:
     tap = Tap(describe(machine.segment))
     rows = machine.run(0.1)
     taken = tap.take(["t", "u1"])
@@ -32,7 +32,7 @@ def test_a_few_columns(machine: Any) -> None:
     assert np.array_equal(taken["u1"], rows["u1"]) and np.array_equal(taken["t"], rows["t"])
 
 
-def test_who_comes_late_is_told_how_much_he_missed(machine: Any) -> None:
+def test_late_tap_counts_the_rows_it_missed(machine: Any) -> None:
     tap = Tap(describe(machine.segment))
     for _ in range(3):
         rows = machine.run(1.0)
@@ -42,7 +42,7 @@ def test_who_comes_late_is_told_how_much_he_missed(machine: Any) -> None:
     assert tap.lost >= 500
 
 
-def test_the_supervisors_place_in_the_ring_is_left_alone(machine: Any) -> None:
+def test_tap_does_not_move_the_read_position_of_the_supervisor(machine: Any) -> None:
     tap = Tap(describe(machine.segment))
     machine.loop.stretch(0, 250)
     assert len(tap.take()) == 250
@@ -51,7 +51,7 @@ def test_the_supervisors_place_in_the_ring_is_left_alone(machine: Any) -> None:
     assert tap.filled == 0.0
 
 
-def test_the_ring_of_a_daemon_that_was_started_since(machine: Any) -> None:
+def test_tap_refuses_the_ring_of_a_restarted_daemon(machine: Any) -> None:
     where = describe(machine.segment)
     machine.segment.unlink()
     machine.segment.path.write_bytes(bytes(100))

@@ -37,7 +37,7 @@ def subscriber(context, telemetry, publish, hwm=1000):
 
 
 def next_message(socket, telemetry):
-    """Publish until one comes. libzmq looks only every other millisecond whether a queue has room again."""
+    """Publish until a message arrives. libzmq checks a full queue only every second millisecond."""
     for _ in range(500):
         telemetry.publish(ROWS)
         if socket.poll(20):
@@ -45,7 +45,7 @@ def next_message(socket, telemetry):
     raise AssertionError("no message within 10 s")
 
 
-def test_sends_topic_and_rows_as_plotjuggler_reads_them(context, made):
+def test_telemetry_sends_topic_and_rows_in_the_format_of_plotjuggler(context, made):
     socket = subscriber(context, made, lambda: made.publish(ROWS))
     assert made.publish(ROWS) == 2
     topic, payload = socket.recv_multipart()
@@ -64,7 +64,7 @@ def test_without_batch_each_row_is_a_message(context, endpoint):
     assert [message["timestamp"] for message in messages] == [0.0, 0.1]
 
 
-def test_counts_what_it_leaves_out(made):
+def test_telemetry_counts_the_rows_it_leaves_out(made):
     many = np.zeros((25, 3))
     assert made.publish(many) == 9
     assert (made.sent, made.thinned) == (9, 16)
@@ -83,7 +83,7 @@ def test_thinning_keeps_the_newest_and_even_gaps(n, most):
         assert len(kept) > most // 2
 
 
-def test_a_slow_subscriber_loses_messages_and_blocks_nobody(context, made):
+def test_slow_subscriber_loses_messages_and_does_not_block(context, made):
     socket = subscriber(context, made, lambda: made.publish(ROWS), hwm=1)
     wide = np.zeros((10, 3))
     for number in range(50 * MESSAGES_WAITING):
@@ -96,15 +96,15 @@ def test_a_slow_subscriber_loses_messages_and_blocks_nobody(context, made):
     assert 1 <= received < 50 * MESSAGES_WAITING
 
 
-def test_who_never_reads_takes_nothing_from_others(context, made):
+def test_subscriber_that_never_reads_does_not_affect_others(context, made):
     deaf = [subscriber(context, made, lambda: made.publish(ROWS), hwm=1) for _ in range(3)]
     reader = subscriber(context, made, lambda: made.publish(ROWS))
-    for _ in range(5 * MESSAGES_WAITING):  # the deaf are long full
+    for _ in range(5 * MESSAGES_WAITING):  # queues of the subscribers that do not read are full
         next_message(reader, made)
     assert len(deaf) == 3
 
 
-def test_who_asks_for_too_long_a_topic_is_cut_off(context, made):
+def test_subscriber_with_too_long_a_topic_is_disconnected(context, made):
     greedy = context.socket(zmq.SUB)
     greedy.linger = 0
     greedy.subscribe("x" * 100_000)
@@ -116,12 +116,12 @@ def test_who_asks_for_too_long_a_topic_is_cut_off(context, made):
     assert not greedy.poll(0)
 
 
-def test_a_subscriber_needs_a_key_that_is_known(tmp_path):
-    """What comes off the host is for those who have a key in `authorized`."""
+def test_subscriber_beyond_the_host_needs_an_authorized_key(tmp_path):
+    """Telemetry beyond the host is for clients with a key in `authorized`."""
     for name in ("server", "alice", "mallory"):
         new_keys(name, tmp_path)
     shutil.copy(tmp_path / "alice.key", tmp_path / "authorized")
-    with zmq.Context() as own:  # ZAP is a matter of the whole context
+    with zmq.Context() as own:  # ZAP authentication holds for the whole context
         telemetry = Telemetry("tcp://127.0.0.1:*", "ivu", ["v", "u"], own, curve=server_curve(tmp_path))
         with zmq.Context() as far:
             others = []
@@ -152,24 +152,24 @@ def test_a_subscriber_needs_a_key_that_is_known(tmp_path):
         telemetry.close()
 
 
-def test_nobody_off_the_host_without_keys(context):
+def test_telemetry_beyond_the_host_needs_keys(context):
     with pytest.raises(UserError, match=r"tcp://0\.0\.0\.0:9872 can be reached from other machines and needs keys"):
         Telemetry("tcp://0.0.0.0:9872", "ivu", ["v"], context)
 
 
 @pytest.mark.parametrize("shape", [(3,), (2, 2), (2, 4)])
-def test_rows_of_another_shape(made, shape):
+def test_rows_of_the_wrong_shape_are_refused(made, shape):
     with pytest.raises(ValueError, match="3 names: timestamp, v, u"):
         made.publish(np.zeros(shape))
 
 
-def test_names_are_unique(context, endpoint):
+def test_duplicate_names_and_empty_messages_are_refused(context, endpoint):
     with pytest.raises(ValueError, match="twice"):
         Telemetry(endpoint, "ivu", ["v", "timestamp"], context)
     with pytest.raises(ValueError, match="at least 1"):
         Telemetry(endpoint, "ivu", ["v"], context, max_rows_per_message=0)
 
 
-def test_two_on_one_endpoint(context, made, endpoint):
+def test_second_publisher_on_an_endpoint_is_refused(context, made, endpoint):
     with pytest.raises(UserError, match="in use by another daemon"):
         Telemetry(endpoint, "ivu", ["v"], context)

@@ -1,4 +1,4 @@
-"""The loop on one host and its plant on another: the same bits on virtual time, a trip where the cable is cut."""
+"""Loop and plant on two hosts: bit-exact with one process on virtual time, and a trip when the cable is cut."""
 
 import contextlib
 import json
@@ -43,7 +43,7 @@ def cable() -> Iterator[TwoHosts]:
 
 
 class Bench:
-    """Both hosts with keys for each other, and what was started on them."""
+    """Both hosts with exchanged keys, and the processes started on them."""
 
     def __init__(self, cable: TwoHosts, folder: Path):
         self.name = f"two{os.getpid()}"
@@ -64,7 +64,7 @@ class Bench:
         return self.started[-1]
 
     def start_plant(self, mode: str, **more: Any) -> subprocess.Popen[str]:
-        """The plant on its host; returns once it listens."""
+        """Start the plant on its host; returns when the plant listens."""
         keys = {"name": self.name, "link.keys": "client", **more}
         process = self.start(self.plant, "plant", "ivu", "--mode", mode, "--endpoint", ENDPOINT, *sets(keys))
         assert process.stdout is not None and process.stderr is not None
@@ -78,7 +78,7 @@ class Bench:
         return self.start(self.loop, *fixed, *words, *sets({**keys, **more}))
 
     def end(self, process: subprocess.Popen[str]) -> tuple[int, str, str]:
-        """Wait for it; its exit code and what it said."""
+        """Wait for a process; returns exit code, stdout and stderr."""
         out, err = process.communicate(timeout=100)
         return process.returncode, out, err
 
@@ -128,7 +128,7 @@ def fused(runtime: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, 
 
 
 @pytest.mark.parametrize("delay", [0.0, 1e-3])
-def test_lockstep_across_the_net_has_the_bits_of_fused(
+def test_lockstep_over_the_network_is_bit_exact_with_fused(
     bench: Bench, fused: dict[str, np.ndarray], delay: float
 ) -> None:
     bench.cable.shape(delay=delay)
@@ -142,8 +142,8 @@ def test_lockstep_across_the_net_has_the_bits_of_fused(
     assert different == []
 
 
-def test_lost_packets_change_no_bit(bench: Bench, fused: dict[str, np.ndarray]) -> None:
-    """What TCP sends again comes late; on virtual time there is no late."""
+def test_lost_packets_do_not_change_a_lockstep_run(bench: Bench, fused: dict[str, np.ndarray]) -> None:
+    """TCP resends lost packets late. On virtual time a delay has no effect."""
     bench.cable.shape(loss=0.01)
     bench.start_plant("lockstep")
     code, _, err = bench.end(bench.start_loop("lockstep", "--for", "0.2s"))
@@ -153,14 +153,14 @@ def test_lost_packets_change_no_bit(bench: Bench, fused: dict[str, np.ndarray]) 
 
 
 @pytest.mark.realtime
-def test_a_cut_cable_trips_and_a_mended_one_runs_again_when_told(bench: Bench) -> None:
+def test_cut_cable_trips_and_the_machine_restarts_only_on_command(bench: Bench) -> None:
     bench.cable.shape(delay=3e-3)
     bench.start_plant("real")
     run = bench.start_loop("real", "--no-arm", **PATIENT)
     with Client(f"ipc://{bench.loop.runtime}/rtctl/{bench.name}.command", timeout=5.0) as client:
 
         def status() -> dict[str, Any]:
-            with contextlib.suppress(UserError):  # not yet there
+            with contextlib.suppress(UserError):  # the daemon does not answer yet
                 return client.call("status")
             return {"ticks": 0, "state": "", "trip": None}
 
@@ -175,14 +175,14 @@ def test_a_cut_cable_trips_and_a_mended_one_runs_again_when_told(bench: Bench) -
         bench.cable.shape(loss=1.0)
         trip = until(lambda: status()["trip"], run)
         assert trip["code"] == "link_lost"
-        until(lambda: outputs_off(status()), run)  # the rows of telemetry are a little behind the state
+        until(lambda: outputs_off(status()), run)  # telemetry lags the state
 
         bench.cable.shape(delay=3e-3)
         frames = status()["frames"]["received"]
         until(lambda: status()["frames"]["received"] > frames + 100, run)
-        assert status()["state"] == "tripped"  # it does not come back by itself
+        assert status()["state"] == "tripped"  # no restart without a command
 
-        def again() -> bool:  # what the cable kept may still be under way, and then the board takes its outputs off
+        def again() -> bool:  # delayed packets may still switch the outputs off
             state = status()["state"]
             if state in ("tripped", "idle"):
                 client.call("reset" if state == "tripped" else "arm")
@@ -209,8 +209,8 @@ def outputs_off(status: dict[str, Any]) -> bool:
 
 
 @pytest.mark.realtime
-def test_outputs_that_waited_in_a_cut_cable_do_nothing(runtime: Path) -> None:
-    """They answer a sample of long ago, by the plant's own clock. Those that answer a new one move the machine."""
+def test_outputs_delayed_beyond_the_link_timeout_have_no_effect(runtime: Path) -> None:
+    """Outputs that answer an old sample (by the clock of the plant) are ignored; those for a new sample act."""
     endpoint = f"ipc://{runtime}/waited"
     command = [*RTCTL, "plant", "ivu", "--mode", "real", "--endpoint", endpoint]
     plant = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
@@ -225,7 +225,7 @@ def test_outputs_that_waited_in_a_cut_cable_do_nothing(runtime: Path) -> None:
         outputs["ao_codes"], outputs["state"] = 800, 2
         outputs["inputs_t_ns"] = first["t_ns"] - 1_000_000_000
         seen, moved = 0, 0.0
-        while seen < 50:  # samples after outputs that are too old
+        while seen < 50:  # samples after outdated outputs
             newest = exchange(socket, outputs)
             seen += newest["outputs_seq"] > 0
         assert travelled(first, newest) == 0.0
@@ -240,14 +240,14 @@ def test_outputs_that_waited_in_a_cut_cable_do_nothing(runtime: Path) -> None:
 
 
 def exchange(socket: zmq.Socket, outputs: np.ndarray) -> np.void:
-    """Send the outputs with the next number; the next sample."""
+    """Send the outputs with the next sequence number; returns the next sample."""
     outputs["seq"] += 1
     socket.send(outputs.tobytes())
     return np.frombuffer(socket.recv(), frames.INPUTS)[0]
 
 
 def travelled(before: np.void, after: np.void) -> float:
-    """Largest change of what only an emulator knows: angles, tensions, radii."""
+    """Largest change of the true state of the emulator: angles, tensions, radii."""
     return float(np.nanmax(np.abs(after["truth"] - before["truth"])))
 
 
@@ -260,7 +260,7 @@ def travelled(before: np.void, after: np.void) -> float:
         ("wrong_server", f"no plant answers at {ENDPOINT} within 0.8 s"),
     ],
 )
-def test_without_the_right_keys_it_is_refused(bench: Bench, spoil: str, words: str) -> None:
+def test_loop_without_the_right_keys_is_refused(bench: Bench, spoil: str, words: str) -> None:
     more: dict[str, Any] = {"link.timeout": 0.8}
     if spoil == "not_authorized":
         other = bench.plant.keys / "authorized" / "client.key"
@@ -281,7 +281,7 @@ def test_without_the_right_keys_it_is_refused(bench: Bench, spoil: str, words: s
     assert "Traceback" not in err
 
 
-def test_a_plant_without_keys_does_not_listen_to_the_net(bench: Bench) -> None:
+def test_plant_without_keys_does_not_listen_on_the_network(bench: Bench) -> None:
     process = bench.start(bench.plant, "plant", "ivu", "--mode", "lockstep", "--endpoint", ENDPOINT)
     code, _, err = bench.end(process)
     assert code == 2

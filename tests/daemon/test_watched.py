@@ -1,4 +1,4 @@
-"""What a watch tells is kept, said in a sentence, and counts as silent after a while."""
+"""Reports of a watch: the last report, its sentence, and the silence timeout."""
 
 from types import SimpleNamespace
 
@@ -22,12 +22,12 @@ def clock(monkeypatch):
     return now
 
 
-def test_nobody_has_told_anything():
+def test_no_watch_report_means_no_sentence():
     assert Watched().told is None
     assert Watched().sentence() is None
 
 
-def test_a_watch_that_is_silent_is_told(clock):
+def test_silent_watch_is_reported(clock):
     kept = Watched()
     kept.take(GOOD)
     assert kept.sentence() == "holds: encoder 1 sigma"
@@ -48,11 +48,11 @@ def test_a_watch_that_is_silent_is_told(clock):
         (ALARM, "departs from the machine since 12 s: drag that the model lacks"),
     ],
 )
-def test_sentences(told, words):
+def test_watch_sentence_for_each_state(told, words):
     assert sentence({"silent": False, "residual": {}, **told}).startswith(words)
 
 
-def test_an_alarm_and_a_silent_watch_in_the_metrics(clock):
+def test_metrics_show_an_alarm_and_drop_it_for_a_silent_watch(clock):
     kept = Watched()
     collector = MachineCollector("ivu", np.zeros(1, STATUS)[0], dict, lambda: kept.told, "real")
 
@@ -68,7 +68,7 @@ def test_an_alarm_and_a_silent_watch_in_the_metrics(clock):
     assert ("rtctl_model_alarm", None) not in found()
 
 
-def test_a_report_is_checked():
+def test_watch_report_is_validated():
     asked = decode_request(encode_request(1, "watch", ALARM))
     assert asked.args.alarm.words.startswith("drag")
     with pytest.raises(ProtocolError, match="state"):

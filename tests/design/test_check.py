@@ -1,4 +1,4 @@
-"""A loop measured on the emulator is the loop that was designed; a limited output measures nothing."""
+"""The loop gain measured on the emulator equals the designed one; a saturated output is no measurement."""
 
 import filters
 import fused
@@ -14,8 +14,8 @@ def shaped():
     return set_path(fused.config("ldu"), "law.position", {"kind": "sections", **filters.FIFTY_HERTZ})
 
 
-def test_reel_unit_has_its_loop():
-    """Motor 1 alone, as the measurement has it."""
+def test_measured_loop_of_the_reel_unit_is_the_designed_one():
+    """Motor 1 alone, as in the measurement."""
     config = fused.config("ivu", law__allocation__kind="motor1")
     got = check.measure(config, rms=1.5, f_max=80.0)
     wanted = margins.of_config(config)
@@ -25,13 +25,13 @@ def test_reel_unit_has_its_loop():
     assert np.median(np.abs(got.L[middle] / response.loop(config, got.f[middle]) - 1)) < 0.05
 
 
-def test_lines_are_odd_and_within_the_band():
+def test_excited_lines_are_odd_and_within_the_band():
     got = check.measure(shaped(), rms=0.4, period=1.0, f_max=120.0)
     assert got.f[0] == 1.0 and got.f[-1] <= 120.0
     assert (np.diff(got.f) == 2.0).all()
 
 
-def test_experiment_leaves_dry_friction_out_and_the_law_in():
+def test_check_experiment_removes_dry_friction_and_keeps_the_law():
     config = shaped()
     played = check.experiment(config, 0.5)
     assert played.plant.parameters.F_c == played.law.friction.F_c == 0.0
@@ -40,18 +40,18 @@ def test_experiment_leaves_dry_friction_out_and_the_law_in():
     assert played.excitation.f_max == 4000.0
 
 
-def test_limited_output_is_no_measurement():
+def test_saturated_output_is_no_measurement():
     with pytest.raises(NoAnswer, match=r"limited at .* s; lower rms from 3 V"):
         check.measure(shaped(), rms=3.0, period=0.5, f_max=120.0)
 
 
-def test_a_trip_is_no_measurement():
+def test_trip_is_no_measurement():
     config = set_path(shaped(), "safety.following_error", 1e-5)
     with pytest.raises(NoAnswer, match="tripped"):
         check.measure(config, rms=0.5, period=0.5, f_max=120.0)
 
 
-def test_lines_that_are_noise_are_no_measurement():
-    """A hundredth of a volt moves the capstan by less than a count."""
+def test_excitation_below_the_noise_is_no_measurement():
+    """0.01 V moves the capstan by less than a count."""
     with pytest.raises(NoAnswer, match="differ from period to period: take more rms"):
         check.measure(fused.config("ivu", law__allocation__kind="motor1"), rms=0.01, f_max=80.0)

@@ -1,4 +1,4 @@
-"""Error tables: made from a scale or an image, they take the capstan's wave out of the position in the emulator."""
+"""Error tables from a scale or an image; the table corrects the capstan's periodic error in the emulator."""
 
 from typing import NamedTuple
 
@@ -23,7 +23,7 @@ TERMS = [
 
 
 class Moved(NamedTuple):
-    """240 mm at 40 mm/s, when the start has died away, the loop of 50 Hz closed on the corrected estimate."""
+    """240 mm at 40 mm/s after the transient; the loop of 50 Hz is closed on the corrected estimate."""
 
     x: np.ndarray  # m, by the encoder
     estimate: np.ndarray  # m, scale - corrected position
@@ -50,8 +50,8 @@ def plain() -> Moved:
     return moved([0.0, 0.0])
 
 
-def test_nine_tenths_of_the_wave_are_gone(plain):
-    """11.3: encoder, coupling and capstan together, from the scale; and the carriage goes where it is told to."""
+def test_table_from_the_scale_removes_nine_tenths_of_the_periodic_error(plain):
+    """11.3: encoder, coupling and capstan together, from the scale; the carriage follows its reference."""
     table = error_table.from_scale(plain.x, plain.estimate, PERIOD)
     put_right = moved(table.settings.values)
     for before, after in ((plain.estimate, put_right.estimate), (plain.tracking, put_right.tracking)):
@@ -60,8 +60,8 @@ def test_nine_tenths_of_the_wave_are_gone(plain):
         assert error_table.periodic(put_right.x, after, PERIOD) < 0.1 * size
 
 
-def test_nine_tenths_by_the_printed_image():
-    """(11.11): luminance of an image, with the way from error to luminance from another record."""
+def test_table_from_an_image_removes_nine_tenths_of_the_periodic_error():
+    """(11.11): luminance of an image; the response from error to luminance is from another record."""
     x = np.arange(0.0, 0.6, 1e-4)
     e = 2.75e-6 * np.sin(2 * np.pi * x / PERIOD - 0.8)
     known = 3e-6 * np.sin(2 * np.pi * x / PERIOD + 0.3)
@@ -87,8 +87,8 @@ def test_amplitude_and_trend_are_found(a, phi, slope):
     np.testing.assert_allclose(table.settings.values, wanted, atol=0.05 * a)
 
 
-def test_guide_waves_stay_out_of_the_table():
-    """150 and 300 mm are the strip's and not the capstan's."""
+def test_waves_of_the_guide_stay_out_of_the_table():
+    """Waves of 150 and 300 mm are those of the guide strip, not of the capstan."""
     x = np.linspace(0, 0.6, 20_000)
     capstan = 3e-6 * np.sin(2 * np.pi * x / PERIOD)
     guide = 2e-6 * np.sin(2 * np.pi * x / 0.15) + 3e-6 * np.cos(2 * np.pi * x / 0.3)
@@ -102,20 +102,20 @@ def test_guide_waves_stay_out_of_the_table():
     (np.round(np.linspace(0, 9, 999)) * PERIOD, np.zeros(999), "no sample near"),
     (np.linspace(0, 9 * PERIOD, 999), 1e-6 * np.random.default_rng(0).standard_normal(999), "nothing comes back"),
 ], ids=["short", "steps", "noise"])  # fmt: skip
-def test_no_table_from_what_carries_none(x, e, words):
+def test_record_without_a_periodic_error_gives_no_table(x, e, words):
     with pytest.raises(NoAnswer, match=words):
         error_table.from_scale(x, e, PERIOD)
 
 
 @pytest.mark.parametrize(("turns", "wave", "words"), [(5, 1.0, "5 turns"), (30, 0.0, "does not stand out")])
-def test_no_table_from_an_image_without_the_wave(turns, wave, words):
+def test_image_without_the_periodic_error_gives_no_table(turns, wave, words):
     x = np.linspace(0, turns * PERIOD, 4000)
     L = 50 + wave * np.sin(2 * np.pi * x / PERIOD) + np.random.default_rng(3).standard_normal(4000)
     with pytest.raises(NoAnswer, match=words):
         error_table.from_luminance(x, L, PERIOD, 1e5)
 
 
-def test_uneven_image_is_refused():
+def test_image_with_uneven_positions_is_refused():
     x = np.linspace(0, 1, 4000) ** 2
     with pytest.raises(NoAnswer, match="evenly"):
         error_table.from_luminance(x, x, PERIOD, 1e5)

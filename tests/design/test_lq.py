@@ -21,28 +21,28 @@ def tuned(belt):
     return tune.tune(belt, method="lq")
 
 
-def test_the_loop_is_stable_with_its_margins_as_it_is_ticked(tuned):
+def test_lq_loop_is_stable_with_its_margins_in_discrete_time(tuned):
     found = margins.of_config(tuned.config)
     assert abs(found.GM) >= LEAST[0] and found.PM >= LEAST[1]
     assert np.abs(systems.poles(tuned.config)).max() < 1.0
-    assert found.M_S < tuned.before.M_S  # than the PD that comes with it
+    assert found.M_S < tuned.before.M_S  # than the shipped PD
 
 
-def test_it_closes_on_the_far_side_of_a_spring(belt):
+def test_lq_closes_the_loop_on_a_sensor_beyond_a_compliance(belt):
     far = set_path(belt, "law", {"feedback": "scale", "drive": "amplifier"})
     found = lq.design(far, LEAST)
     assert found.crossover > 3.0
     assert np.abs(systems.poles(found.config)).max() < 1.0
 
 
-def test_a_machine_that_shows_its_speed_alone_has_no_state_for_the_position():
+def test_machine_with_a_speed_sensor_only_has_no_position_state():
     spindle = load_config("machines/spindle")
     start = response.take(set_path(spindle, "law.position", {"kind": "pd", "gain": 1.0}))
     assert len(lq.sampled(start).B) < len(start.model.A) + start.delay
     assert np.abs(systems.poles(lq.design(spindle, LEAST).config)).max() < 1.0 + 1e-9
 
 
-def test_a_bandwidth_that_the_delay_forbids_has_no_answer(belt):
+def test_bandwidth_beyond_the_limit_of_the_delay_has_no_answer(belt):
     with pytest.raises(NoAnswer, match="no state feedback from encoder to amplifier"):
         lq.design(belt, LEAST, 90.0)
 

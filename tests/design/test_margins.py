@@ -1,4 +1,4 @@
-"""Margins by python-control, by interpolation and by closed forms say the same."""
+"""Margins by python-control, by interpolation and in closed form agree."""
 
 import control
 import fused
@@ -17,7 +17,7 @@ def mass(gain: float, tau: float = 0.1, late: float = 3e-3):
 
 @settings(deadline=None, max_examples=25)
 @given(st.floats(5.0, 400.0), st.floats(0.05, 0.4))
-def test_points_and_control_agree(gain, tau):
+def test_interpolated_margins_agree_with_python_control(gain, tau):
     L = mass(gain, tau)
     exact = margins.margins(L, 0.05, 400)
     f = np.geomspace(0.05, 400, 3000)
@@ -29,8 +29,8 @@ def test_points_and_control_agree(gain, tau):
     assert rough.bandwidth == pytest.approx(exact.bandwidth, rel=1e-3)
 
 
-def test_delay_of_a_double_integrator_in_closed_form():
-    """The phase reaches -180 where atan(w tau) = w late."""
+def test_margins_of_a_delayed_double_integrator_agree_with_the_closed_form():
+    """The phase is -180 deg at atan(w tau) = w late."""
     m = margins.margins(mass(60.0), 0.05, 400)
     w = 2 * np.pi * m.f_GM
     assert np.arctan(0.1 * w) == pytest.approx(3e-3 * w, rel=1e-4)
@@ -42,7 +42,7 @@ def test_delay_of_a_double_integrator_in_closed_form():
     ("ivu", {}), ("ivu", {"law__position__derivative_filter": None}), ("ldu", {}), ("axis", {}),
     ("ivu", {"law__position__gain": 90.0}), ("ldu", {"law__position__velocity_gain": 260.0}),
 ])  # fmt: skip
-def test_turns_of_nyquist_and_poles_agree_on_stability(name, changes):
+def test_nyquist_criterion_and_poles_agree_on_stability(name, changes):
     config = fused.config(name, **changes)
     assert margins.of_config(config).stable == (np.abs(systems.poles(config)).max() < 1)
 
@@ -58,12 +58,12 @@ def test_sampled_system_has_the_same_margins():
 
 
 @pytest.mark.parametrize("name", ["ivu", "ldu", "axis"])
-def test_quick_ones_are_the_same(name):
+def test_quick_margins_agree_with_the_full_ones(name):
     slow, quick = (margins.of_config(fused.config(name), quick=q) for q in (False, True))
     np.testing.assert_allclose(quick[1:], slow[1:], rtol=2e-3)
 
 
-def test_present_linear_drive():
+def test_margins_of_the_present_linear_drive_are_those_of_the_thesis():
     """12.7: approximately 8 Hz, and a gain margin of only 2 dB, at the first resonance."""
     m = margins.of_config(fused.config("ldu"))
     assert m.bandwidth == pytest.approx(8.0, rel=0.1)
@@ -71,7 +71,7 @@ def test_present_linear_drive():
     assert 100 < m.f_GM < 120
 
 
-def test_raising_the_gain_by_the_margin_ends_stability():
+def test_gain_raised_beyond_the_gain_margin_is_unstable():
     config = fused.config("ivu")
     m = margins.of_config(config)
     for dB, stable in ((m.GM - 0.1, True), (m.GM + 0.1, False)):
@@ -82,13 +82,13 @@ def test_raising_the_gain_by_the_margin_ends_stability():
 
 
 @pytest.mark.parametrize(("gain", "side"), [(1e-12, "below"), (1e12, "above")])
-def test_no_crossover_no_answer(gain, side):
+def test_loop_without_a_crossover_has_no_answer(gain, side):
     f = np.geomspace(1, 100, 200)
     with pytest.raises(NoAnswer, match=f"{side} 1 from 1 to 100 Hz"):
         margins.points(f, mass(gain)(f))
 
 
-def test_loop_without_a_turn_has_an_infinite_margin():
+def test_loop_without_a_phase_crossover_has_an_infinite_gain_margin():
     f = np.geomspace(0.01, 100, 500)
     m = margins.points(f, 1 / (2j * np.pi * f))
     assert m.stable and np.isinf(m.GM) and np.isnan(m.f_GM)

@@ -1,4 +1,4 @@
-"""Motors for reels: what appendix E prints follows from K, R and I_0, and a move is met where torque is left."""
+"""Reel motors: the values of appendix E follow from K, R and I_0; a move needs a torque reserve."""
 
 import math
 
@@ -10,7 +10,7 @@ PRINTED = {"706": 45.4, "707": 24.4, "708": 15.1, "709": 8.2, "711": 5.0}  # rpm
 
 
 @pytest.mark.parametrize("motor", motors.APPENDIX_E, ids=lambda motor: motor.name)
-def test_speed_without_load(motor):
+def test_no_load_speed_is_that_of_appendix_e(motor):
     assert motor.no_load / motors.RPM == pytest.approx(PRINTED[motor.name[:3]], rel=0.05)
     assert motor.at(motor.no_load) == pytest.approx(0.0, abs=1e-12) and motor.at(0.0) == motor.most
 
@@ -22,14 +22,14 @@ def test_current_and_inertia_behind_a_gear():
     assert motor.stall == pytest.approx(10 * 0.05 * 2.4 - 0.05)
 
 
-def test_peaks_of_a_move():
+def test_peak_speed_and_acceleration_of_a_move():
     """x = d / 2 (1 - cos w t): v = d w / 2, a = d w^2 / 2."""
     found = motors.move(0.2, 2.0, 0.02)
     assert found.speed == pytest.approx(0.1 * math.pi / 2 / 0.02)
     assert found.acceleration == pytest.approx(0.1 * (math.pi / 2) ** 2 / 0.02) and found.torque == pytest.approx(2e-3)
 
 
-def test_a_gear_that_the_tape_cannot_turn_does_not_fit():
+def test_gear_that_the_tape_cannot_turn_does_not_fit():
     asked = motors.move(0.2, 10.0, 0.02)
     geared = motors.fit(motors.APPENDIX_E[1], asked, 0.02, 0.0)
     assert geared.left > 0 and geared.back > 10 and not geared.good

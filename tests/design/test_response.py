@@ -1,4 +1,4 @@
-"""Responses are those of the coefficients that the tick runs, and of the plant that the emulator is."""
+"""Frequency responses agree with the coefficients of the tick and with the plant of the emulator."""
 
 import fused
 import numpy as np
@@ -16,7 +16,7 @@ F = np.array([0.7, 3.0, 11.0, 40.0, 90.0])
 
 
 def sine_response(step, f: float, dt: float) -> complex:
-    """Output over input of a law that is stepped with a complex sine's real part, whole periods at the end."""
+    """Response of a law stepped with a sine, measured over an integer number of final periods."""
     n = round(200 / (f * dt))
     t = np.arange(n) * dt
     y = np.array([step(x) for x in np.cos(2 * np.pi * f * t)])
@@ -27,7 +27,7 @@ def sine_response(step, f: float, dt: float) -> complex:
     return complex(a, b)
 
 
-def test_pd_is_the_one_that_is_stepped():
+def test_response_of_the_pd_agrees_with_the_stepped_law():
     config = fused.config("ivu")
     p, s = pd.build(config.law.position, 2e-3), np.zeros(1, pd.PD_STATE)[0]
     for f in (3.0, 40.0):
@@ -35,7 +35,7 @@ def test_pd_is_the_one_that_is_stepped():
         assert response.law(config, np.array([f]))[0] == pytest.approx(got, rel=2e-3)
 
 
-def test_pi_with_velocity_feedback_is_the_one_that_is_stepped():
+def test_response_of_the_pi_with_velocity_agrees_with_the_stepped_law():
     config = fused.config("ldu", law__position__tau_i=None)
     p, v = pi_velocity.build(config.law.position, 1e-4), velocity.build(config.law.velocity, 1e-4)
     s = np.zeros(1, pi_velocity.PI_VELOCITY_STATE)[0]
@@ -51,7 +51,7 @@ def test_integral_part_of_the_law():
     np.testing.assert_allclose(with_it - without, 6400 * 1e-4 / 4.0 / (1 - back), rtol=1e-9)
 
 
-def test_sections_are_the_filters_of_scipy():
+def test_response_of_the_sections_agrees_with_scipy():
     law = {"kind": "sections", "sections": [{"kind": "lead_lag", "k": 8e4, "alpha": 0.05, "tau_I": 8, "beta": 20,
            "tau_D": 2e-3}, {"kind": "notch", "frequency": 110, "zeta_z": 0.1, "zeta_p": 0.6}]}  # fmt: skip
     config = set_path(fused.config("ldu"), "law.position", law)
@@ -62,7 +62,7 @@ def test_sections_are_the_filters_of_scipy():
     np.testing.assert_allclose(response.law(config, F), wanted, rtol=1e-9)
 
 
-def test_plant_is_the_state_space_of_the_emulator():
+def test_plant_response_agrees_with_the_state_space_of_the_emulator():
     config = fused.config("ldu")
     p = next(b.params for b in machines.build(config).plant_diagram.blocks if b.name == "plant")
     A, B = ldu.state_space(p)
@@ -70,25 +70,25 @@ def test_plant_is_the_state_space_of_the_emulator():
     np.testing.assert_allclose(response.plant(config, F), wanted, rtol=1e-6)
 
 
-def test_scale_sees_the_carriage_and_encoder_the_shaft():
+def test_scale_measures_the_carriage_and_encoder_the_shaft():
     f = np.array([5.0, 270.0])
     shaft, carriage = (response.plant(fused.config("ldu", sensors__feedback=s), f) for s in ("encoder", "scale"))
     assert shaft[0] == pytest.approx(carriage[0], rel=1e-2)
-    assert abs(carriage[1]) < 0.3 * abs(shaft[1])  # the anti-resonance is the carriage's
+    assert abs(carriage[1]) < 0.3 * abs(shaft[1])  # anti-resonance of the carriage
 
 
-def test_process_gain_of_the_thesis():
+def test_process_gain_is_that_of_the_thesis():
     """8.2: K_p = 25.4 at 1 Hz, per ampere."""
     P = response.plant(fused.config("ivu"), np.array([1.0]))
     assert abs(P[0]) * (2 * np.pi) ** 2 / 0.2 == pytest.approx(25.4, rel=0.03)
 
 
-def test_axis_is_a_mass_with_a_brake():
+def test_axis_is_a_mass_with_viscous_friction():
     s = 2j * np.pi * F
     np.testing.assert_allclose(response.plant(fused.config("axis"), F), 35.15 / (95.1 * s**2 + 203.5 * s), rtol=1e-9)
 
 
-def test_allocation_says_through_which_motor():
+def test_allocation_selects_the_motors_of_the_plant_response():
     one, two = (response.plant(fused.config("ivu"), F, motor) for motor in (1, 2))
     both = response.plant(fused.config("ivu", law__allocation__kind="differential"), F)
     np.testing.assert_allclose(both, (one + two) / 2, rtol=1e-9)
@@ -96,7 +96,7 @@ def test_allocation_says_through_which_motor():
         np.testing.assert_allclose(response.plant(fused.config("ivu", law__allocation__kind=kind), F), motor)
 
 
-def test_schedule_is_in_the_law():
+def test_gain_schedule_is_part_of_the_law_response():
     radii = {"radius__R1": 0.04, "radius__R2": 0.04}
     floor = {"law__gain_schedule__floor": 0.0}
     fixed, led = (
@@ -105,12 +105,12 @@ def test_schedule_is_in_the_law():
     assert 0.3 < abs(led[0] / fixed[0]) < 0.7
 
 
-def test_a_tick_of_delay_comes_with_writing_at_the_next_tick():
+def test_write_at_the_next_tick_adds_one_tick_of_delay():
     late, soon = (response.loop(fused.config("ivu", loop__write=w), F) for w in ("next_tick", "same_tick"))
     np.testing.assert_allclose(late / soon, np.exp(-2j * np.pi * F * 2e-3), rtol=1e-9)
 
 
-def test_printed_law_has_three_milliseconds():
+def test_printed_law_has_a_delay_of_three_milliseconds():
     config = fused.config("ivu")
     s = 2j * np.pi * F
     wanted = response.plant(config, F) * 31 * (1 + 0.16 * s) * np.exp(-3e-3 * s)

@@ -11,7 +11,7 @@ def found() -> schedule.Schedule:
     return schedule.design(fused.config("ivu"), printed=True)
 
 
-def test_every_radius_keeps_six_decibels(found):
+def test_schedule_keeps_six_decibels_at_every_radius(found):
     """Chapter 9: the fixed gain has 1.2 dB left at 40/40 mm."""
     assert found.fixed.worst[0] == pytest.approx(1.2, abs=0.15)
     assert found.scheduled.GM.min() >= 6.0
@@ -21,20 +21,20 @@ def test_every_radius_keeps_six_decibels(found):
 
 @pytest.mark.parametrize("motor", [1, 2])
 @pytest.mark.parametrize(("R_drive", "R_other"), [(0.0388, 0.0388), (0.0213, 0.0392), (0.0365, 0.0211)])
-def test_between_the_nodes_and_for_both_motors(found, R_drive, R_other, motor):
+def test_schedule_keeps_the_margins_between_nodes_and_for_both_motors(found, R_drive, R_other, motor):
     config = schedule.with_table(fused.config("ivu"), found.table)
     m = robustness.at(config, R_drive, R_other, motor, printed=True)
     assert m.stable and m.GM >= 6.0 and m.PM > 44.0
 
 
-def test_loop_gain_stays_where_the_margin_allows_it(found):
+def test_schedule_keeps_the_loop_gain_where_the_margin_allows(found):
     """At the radii of the design the factor is about 1."""
     config = schedule.with_table(fused.config("ivu"), found.table)
     plain, led = (robustness.at(c, 0.038, 0.022) for c in (fused.config("ivu"), config))
     assert plain.GM - led.GM == pytest.approx(0.0, abs=2.5)
 
 
-def test_the_machine_runs_with_the_table(found):
+def test_machine_runs_with_the_gain_schedule(found):
     """Full reels, where the fixed gain is nearly unstable."""
     config = schedule.with_table(robustness.with_radii(fused.config("ivu", "steps"), 0.04, 0.04), found.table)
     run = fused.run(config, 6.0)
@@ -44,12 +44,12 @@ def test_the_machine_runs_with_the_table(found):
     assert abs(rows["truth_capstan"][-1] - rows["target"][-1]) < 0.015
 
 
-def test_more_than_can_be_had():
+def test_unreachable_margins_have_no_schedule():
     with pytest.raises(NoAnswer, match="no factor keeps 6 dB and 89 deg"):
         schedule.design(fused.config("ivu"), PM=89.0, radii=(0.02, 0.04))
 
 
-def test_factor_is_the_nearest_that_keeps_both():
+def test_gain_factor_is_the_nearest_that_keeps_both_margins():
     f = np.geomspace(0.05, 200, 2000)
     s = 2j * np.pi * f
     L = 60 * (1 + 0.1 * s) / s**2 * np.exp(-3e-3 * s)

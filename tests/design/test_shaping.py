@@ -1,4 +1,4 @@
-"""Loop shaping for the linear drive: 50 Hz, 11 dB and 60 degrees, on a model, on a noisy response, and when it runs."""
+"""Loop shaping for the linear drive: 50 Hz, 11 dB, 60 deg; on a model, on a noisy response, and in a run."""
 
 import fused
 import numpy as np
@@ -16,7 +16,7 @@ def shaped() -> shaping.Shaped:
     return shaping.design(fused.config("ldu"))
 
 
-def test_thesis_numbers_on_the_model(shaped):
+def test_shaping_reaches_the_figures_of_the_thesis_on_the_model(shaped):
     """12.7: 52 Hz, 11 dB, 60 deg."""
     config = shaping.applied(fused.config("ldu"), shaped.law)
     m = margins.of_config(config)
@@ -25,14 +25,14 @@ def test_thesis_numbers_on_the_model(shaped):
     assert np.abs(systems.poles(config)).max() < 1
 
 
-def test_lead_lag_two_notches_and_a_low_pass(shaped):
+def test_shaped_filters_are_lead_lag_two_notches_and_a_low_pass(shaped):
     kinds = [section.kind for section in shaped.law.sections]
     assert kinds == ["lead_lag", "notch", "notch", "low_pass"]
     assert shaped.law.sections[1].frequency == pytest.approx(114, rel=0.15)
 
 
-def test_the_emulator_has_the_loop_that_was_designed(shaped):
-    """Measured by a multisine in a fused run, in the time domain, with all its quantisation."""
+def test_loop_of_the_emulator_is_the_designed_one(shaped):
+    """Measured by a multisine in a fused run with quantisation."""
     config = shaping.applied(fused.config("ldu"), shaped.law)
     got = check.measure(config, rms=0.6, f_max=150.0)
     wanted = margins.of_config(config)
@@ -45,8 +45,8 @@ def test_the_emulator_has_the_loop_that_was_designed(shaped):
     assert np.median(np.abs(got.L[low] / response.loop(config, got.f[low]) - 1)) < 0.03
 
 
-def test_a_printing_step_settles_faster_than_now(shaped):
-    """1/12 mm: into 5 % and to rest, with the friction that the carriage has."""
+def test_printing_step_settles_faster_than_with_the_present_law(shaped):
+    """1/12 mm: settling to 5 % and to rest, with the friction of the carriage."""
     times = []
     for config in (fused.config("ldu", "print_steps"), shaping.applied(fused.config("ldu", "print_steps"), shaped.law)):
         run = fused.run(config, 1.2)
@@ -58,7 +58,7 @@ def test_a_printing_step_settles_faster_than_now(shaped):
     assert times[1] < 0.8 * times[0]
 
 
-def test_filters_are_those_that_will_be_sampled():
+def test_shaping_uses_the_sampled_filters():
     f = np.geomspace(1, 4000, 200)
     box = shaping._box(f, 1 / f**2 + 0j, shaping.Limits(), 1e-4)
     x = shaping._unfold(np.full(len(box), 0.3), box)
@@ -67,8 +67,8 @@ def test_filters_are_those_that_will_be_sampled():
     np.testing.assert_allclose(shaping._filters(x, f, 1e-4), wanted, rtol=2e-3)
 
 
-def test_on_a_response_that_was_measured(monkeypatch):
-    """With 1 % of noise, hold and delay in it, from 1 to 1000 Hz."""
+def test_shaping_on_a_measured_response(monkeypatch):
+    """Response with 1 % noise, hold and delay, 1 to 1000 Hz."""
     for name, value in SHORT.items():
         monkeypatch.setattr(shaping, name, value)
     config = fused.config("ldu", sensors__feedback="scale")
@@ -82,20 +82,20 @@ def test_on_a_response_that_was_measured(monkeypatch):
     assert m.stable and m.GM > 8.5 and m.PM > 54 and m.bandwidth > 43
 
 
-def test_too_much_is_refused_with_what_was_found(monkeypatch):
+def test_unreachable_requirements_are_refused_with_the_best_result(monkeypatch):
     for name, value in SHORT.items():
         monkeypatch.setattr(shaping, name, value)
     with pytest.raises(NoAnswer, match=r"cannot be met: .* Hz with .* dB, .* deg"):
         shaping.design(fused.config("ldu"), shaping.Limits(bandwidth=400.0))
 
 
-def test_a_short_response_is_refused():
+def test_short_response_is_refused():
     f = np.geomspace(20, 100, 100)
     with pytest.raises(NoAnswer, match="runs from 20 to 100 Hz; shaping for 50 Hz takes one from 5 to 150 Hz"):
         shaping.of_points(f, 1 / f**2 + 0j, 1e-4)
 
 
-def test_resonances_stand_out_from_the_slope():
+def test_resonances_are_found_above_the_slope():
     config = fused.config("ldu")
     f = np.geomspace(1, 4000, 3000)
     found = shaping.resonances(f, response.plant(config, f))
@@ -103,7 +103,7 @@ def test_resonances_stand_out_from_the_slope():
     assert shaping.resonances(f, 1 / f**2 + 0j) == []
 
 
-def test_resonance_beyond_the_crossover_counts_wherever_its_phase_lies():
+def test_resonance_beyond_the_crossover_counts_at_any_phase():
     f = np.geomspace(1, 100, 400)
     quiet = 10 / f * np.exp(-0.5j * np.pi) * np.ones(len(f))
     loud = quiet * (1 + 4 * np.exp(-(((f - 50) / 3) ** 2)))
@@ -112,8 +112,8 @@ def test_resonance_beyond_the_crossover_counts_wherever_its_phase_lies():
 
 
 @pytest.mark.parametrize("rate", [500.0, 10e3])
-def test_every_filter_in_the_box_can_be_built(rate):
-    """At any sample rate and with resonances next to its half."""
+def test_every_filter_within_the_search_bounds_can_be_built(rate):
+    """At any sample rate, also with resonances near the Nyquist frequency."""
     f = np.geomspace(0.5, 0.49 * rate, 300)
     P = (1 + 20 * np.exp(-(((f / rate - 0.44) / 0.01) ** 2))) / f**2 + 0j
     box = shaping._box(f, P, shaping.Limits(bandwidth=0.02 * rate), 1 / rate)

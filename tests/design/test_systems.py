@@ -9,8 +9,8 @@ from rtctl.design import response, systems
 
 
 @pytest.mark.parametrize("name", ["ivu", "ldu", "axis"])
-def test_sampled_loop_is_the_loop(name):
-    """Images beyond half the sample rate change it by a fraction of a percent well below."""
+def test_sampled_loop_agrees_with_the_continuous_loop(name):
+    """Images beyond half the sample rate change the response at low frequency by a fraction of a percent."""
     config = fused.config(name)
     P, K, _ = systems.sampled(config)
     f = np.geomspace(0.02, 1, 20) * 0.1 / P.dt
@@ -20,7 +20,7 @@ def test_sampled_loop_is_the_loop(name):
     np.testing.assert_allclose(K(z), response.law(config, f), rtol=1e-6)
 
 
-def test_step_response_is_what_the_machine_does():
+def test_step_response_agrees_with_the_run():
     """A small step of the axis without friction, to the count."""
     config = fused.config("axis", law__shaper__bandwidth=None, plant__parameters__F_c=0.0)
     config = config.model_copy(update={"reference": type(config.reference)(steps=[{"at": 0.2, "to": 1e-4}])})
@@ -45,7 +45,7 @@ def test_write_at_the_same_tick_has_one_state_less():
         {"integral": {"gain": 20.0}, "observer": {"bandwidth": 5.0, "acceleration": 320.0}},
     ],
 )
-def test_what_stands_around_a_law_is_in_its_poles(around):
+def test_sampled_law_includes_the_compensation(around):
     config = set_path(load_config("machines/belt"), "law.compensation", around)
     _, K, R = systems.sampled(config)
     f = np.geomspace(0.5, 0.4 * config.loop.rate, 20)

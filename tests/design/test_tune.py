@@ -1,4 +1,4 @@
-"""Tuning: the law holds on its own model, runs, and says why; what cannot be tuned is refused."""
+"""Tuning: margins on the model, a run, reasons in the config, and refused requirements."""
 
 import filters
 import fused
@@ -29,7 +29,7 @@ def ldu() -> tune.Tuned:
         return tune.tune(config)
 
 
-def test_reel_unit_gets_a_schedule(ivu):
+def test_reel_unit_gets_a_gain_schedule(ivu):
     assert ivu.config.law.gain_schedule.mode == "margin"
     assert ivu.config.law.position.gain == pytest.approx(30.8, rel=0.01)
     for R1, R2 in ((0.04, 0.04), (0.02, 0.04)):
@@ -38,7 +38,7 @@ def test_reel_unit_gets_a_schedule(ivu):
     assert set(ivu.maps) == {"fixed gain", "scheduled"}
 
 
-def test_reel_unit_runs_with_it(ivu):
+def test_reel_unit_runs_with_its_gain_schedule(ivu):
     run = fused.run(ivu.config, 4.4)
     assert not run.tripped
     end = run.between(3.7, 3.95)
@@ -59,7 +59,7 @@ def test_axis_gets_a_pd():
 
 
 @pytest.mark.parametrize("name", ["ivu", "ldu"])
-def test_written_config_loads_to_the_same_and_says_why(name, request, tmp_path):
+def test_written_config_loads_unchanged_and_contains_the_reasons(name, request, tmp_path):
     found = request.getfixturevalue(name)
     text = tune.written(found, "tuned")
     path = tmp_path / "tuned.yaml"
@@ -76,12 +76,12 @@ def test_written_config_loads_to_the_same_and_says_why(name, request, tmp_path):
     assert yaml.safe_load(text)["machine"] == name
 
 
-def test_an_unstable_loop_is_no_start():
+def test_unstable_loop_is_refused_as_a_start():
     with pytest.raises(NoAnswer, match=r"the loop of ivu is unstable at 26\.\d Hz; its gain is 4\.\d dB too high"):
         tune.tune(fused.config("ivu", law__position__gain=120.0))
 
 
-def test_margins_that_the_machine_cannot_have():
+def test_unreachable_margins_are_refused():
     with pytest.raises(NoAnswer, match=r"no factor keeps 35 dB and 45 deg at \d+/\d+ mm"):
         tune.tune(fused.config("ivu"), GM=35.0)
 
@@ -90,12 +90,12 @@ def test_margins_that_the_machine_cannot_have():
     ({"bandwidth": 0.0}, "--bandwidth 0"), ({"bandwidth": 60.0}, "a tenth of the rate, 50 Hz"),
     ({"damping": 0.0}, "--damping"), ({"GM": -1.0}, "--gm"), ({"PM": 120.0}, "--pm"),
 ])  # fmt: skip
-def test_wishes_that_make_no_sense(wish, words):
+def test_invalid_requirements_are_refused(wish, words):
     with pytest.raises(UserError, match=words):
         tune.tune(fused.config("ivu"), **wish)
 
 
-def test_picture_has_the_loops_and_their_margins(ldu, tmp_path):
+def test_picture_shows_the_loops_and_their_margins(ldu, tmp_path):
     figure = figures.loops({"before": fused.config("ldu"), "after": ldu.config})
     plot.save(figure, tmp_path / "loop.png")
     assert (tmp_path / "loop.png").stat().st_size > 20_000
@@ -107,7 +107,7 @@ def test_picture_has_the_loops_and_their_margins(ldu, tmp_path):
     assert f"GM {ldu.after.GM:.1f} dB" in figure.get_suptitle()
 
 
-def test_picture_of_the_radii(ivu, tmp_path):
+def test_picture_of_the_radius_map(ivu, tmp_path):
     figure = figures.radii(ivu.maps)
     assert len(figure.axes) == 4
     assert "scheduled: at least" in figure.axes[1].get_title()
@@ -121,7 +121,7 @@ def test_unstable_loop_is_drawn_without_a_step_response():
     assert not margins.of_config(fused.config("ivu", law__position__gain=120.0)).stable
 
 
-def test_other_limits_reach_the_design(monkeypatch):
+def test_requested_limits_are_passed_to_the_design(monkeypatch):
     seen = {}
 
     def design(config, limits):

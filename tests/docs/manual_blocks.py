@@ -29,7 +29,7 @@ class Block(NamedTuple):
 
 
 def blocks(page: Path, text: str | None = None) -> list[Block]:
-    """The fenced blocks of a page; `text` is instead of the file's."""
+    """The fenced blocks of a page; `text` replaces that of the file."""
     text = (ROOT / page).read_text() if text is None else text
     return [Block(page, text.count("\n", 0, m.start(3)) + 1, m[2], m[3]) for m in FENCE.finditer(text)]
 
@@ -58,5 +58,5 @@ def commands(block: Block) -> Iterator[tuple[str, str]]:
 
 
 def prose(text: str) -> str:
-    """A page without its blocks and spans of code."""
+    """Text of a page without code blocks and code spans."""
     return re.sub(r"`[^`\n]*`", "", FENCE.sub("", text))

@@ -1,4 +1,4 @@
-"""What the manual shows is right: commands parse, configs are valid, Python compiles, the first steps really run."""
+"""Code blocks of the manual: commands parse, configs are valid, Python compiles, the quick start runs."""
 
 import re
 import shlex
@@ -21,12 +21,12 @@ SHOWN = [block for page in PAGES for block in blocks(page)]
 MADE = [block for name, text in generated().items() for block in blocks(ROOT / "docs" / name, text)]
 
 
-def test_there_are_blocks_to_look_at():
+def test_manual_has_code_blocks():
     assert len([line for block in SHOWN for line in commands(block)]) > 60
 
 
 @pytest.mark.parametrize("block", [b for b in SHOWN if b.language in ("bash", "console")], ids=lambda b: b.where)
-def test_commands(block):
+def test_commands_in_the_manual_parse(block):
     wrong = []
     for where, line in commands(block):
         try:
@@ -39,20 +39,20 @@ def test_commands(block):
     assert wrong == []
 
 
-def test_commands_of_pages_that_are_made():
+def test_commands_in_generated_pages_parse():
     for block in MADE:
         for _, line in commands(block):
             parse(line)
 
 
-def test_targets_of_make_are_there():
+def test_make_targets_in_the_manual_exist():
     named = {word for b in SHOWN if b.language == "bash" for word in re.findall(r"^make (\w+)", b.text, re.M)}
     targets = set(re.findall(r"^(\w+):", (ROOT / "Makefile").read_text(), re.M))
     assert named and named <= targets
 
 
 @pytest.mark.parametrize("block", [b for b in (*SHOWN, *MADE) if b.language == "yaml"], ids=lambda b: b.where)
-def test_yaml(block, tmp_path):
+def test_yaml_blocks_are_valid_configs(block, tmp_path):
     data = yaml.safe_load(block.text)
     file = tmp_path / "config.yaml"
     file.write_text(block.text)
@@ -68,12 +68,12 @@ def test_yaml(block, tmp_path):
 
 
 @pytest.mark.parametrize("block", [b for b in SHOWN if b.language == "python"], ids=lambda b: b.where)
-def test_python(block):
+def test_python_blocks_compile(block):
     if "..." not in block.text and not block.text.startswith("class "):
         compile(block.text, block.where, "exec")
 
 
-def test_a_wrong_command_is_found():
+def test_invalid_command_is_found():
     def complaint(line: str) -> str:
         with pytest.raises(UserError) as caught:
             parse(line)
@@ -90,12 +90,12 @@ def test_a_wrong_command_is_found():
 
 
 def first_commands(page: str) -> list[str]:
-    """The commands of a page's blocks that run on virtual time and leave something to look at."""
+    """Commands of a page that run on virtual time and write files."""
     return [line for b in blocks(ROOT / "docs" / page) for _, line in commands(b) if "--mode fused" in line]
 
 
 def test_quick_start_runs(rtctl_here, tmp_path):
-    """The commands that the quick start begins with, as they stand there."""
+    """First commands of the quick start, verbatim."""
     for line in (
         "rtctl check ivu",
         *first_commands("quickstart.md"),
@@ -112,7 +112,7 @@ def test_quick_start_runs(rtctl_here, tmp_path):
 
 @pytest.fixture
 def rtctl_here(tmp_path, monkeypatch, capsys):
-    """`rtctl_here("check", "ivu")` in an empty folder: exit code and what was printed."""
+    """`rtctl_here("check", "ivu")` in an empty folder: exit code and output."""
     from rtctl.cli.main import main
 
     monkeypatch.chdir(tmp_path)
@@ -124,7 +124,7 @@ def rtctl_here(tmp_path, monkeypatch, capsys):
     return call
 
 
-def test_example_of_the_api_runs(capsys):
+def test_api_example_runs(capsys):
     block = blocks(ROOT / "docs" / "api.md")[0]
     names: dict = {}
     exec(compile(block.text, block.where, "exec"), names)
@@ -132,6 +132,6 @@ def test_example_of_the_api_runs(capsys):
     assert capsys.readouterr().out.count("settles in") == 3
 
 
-def test_block_of_an_unclosed_fence_is_none():
+def test_unclosed_fence_is_not_a_block():
     assert blocks(PAGES[0], "```bash\nrtctl run\n") == []
     assert blocks(PAGES[0], "```bash\nrtctl run\n```\n") == [Block(PAGES[0], 2, "bash", "rtctl run\n")]

@@ -1,4 +1,4 @@
-"""The page on logs of one's own machine, played with logs that the simulation of the fits makes."""
+"""Manual page on user logs, run with logs of the fit simulation."""
 
 import re
 import sys
@@ -28,7 +28,7 @@ LOGS = {  # log -> description, its columns in the log, amplitude of the command
 
 
 @pytest.mark.parametrize(("log", "verdict"), [("swing", "Nothing is missing"), ("axis", "The carriage rubs")])
-def test_from_a_log_to_a_report(log, verdict, tmp_path, monkeypatch):
+def test_documented_steps_lead_from_a_log_to_a_report(log, verdict, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     number, names, amplitude, terms = LOGS[log]
     name = ("pendulum", "belt")[number]

@@ -1,4 +1,4 @@
-"""Every link and picture of the manual leads somewhere: file, page that is made at build time, and heading."""
+"""Links and pictures of the manual: existing files, generated pages and headings."""
 
 import re
 from pathlib import Path
@@ -13,7 +13,7 @@ MADE = generated()
 
 
 def slugs(text: str) -> set[str]:
-    """Anchors of a page's headings, as mkdocs makes them."""
+    """Anchors of the headings of a page, as in mkdocs."""
     found = set()
     for heading in re.findall(r"^#+ (.*)$", re.sub(r"^```.*?^```", "", text, flags=re.M | re.S), re.M):
         named = re.search(r"\{ #([\w-]+) \}", heading)
@@ -23,7 +23,7 @@ def slugs(text: str) -> set[str]:
 
 
 def broken(page: Path, text: str) -> list[str]:
-    """What is wrong with the links of a page."""
+    """Broken links of a page."""
     wrong = []
     for target in LINK.findall(prose(text)):
         if re.match(r"[a-z]+:", target):
@@ -41,16 +41,16 @@ def broken(page: Path, text: str) -> list[str]:
 
 
 @pytest.mark.parametrize("page", PAGES, ids=str)
-def test_links(page):
+def test_links_of_the_manual_exist(page):
     assert broken(page, (ROOT / page).read_text()) == []
 
 
 @pytest.mark.parametrize("name", MADE)
-def test_links_of_pages_that_are_made(name):
+def test_links_of_generated_pages_exist(name):
     assert broken(Path("docs") / name, MADE[name]) == []
 
 
-def test_a_broken_link_is_found():
+def test_broken_link_is_found():
     page = Path("docs/index.md")
     assert broken(page, "[a](nowhere.md) `[b](not_a_link.md)` ![c](images/none.png) [d](commands.md#rtctl-run)") == [
         "nowhere.md: no such file",

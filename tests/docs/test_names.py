@@ -1,4 +1,4 @@
-"""What the pages on diagnosis call by its file or name is there, under that name."""
+"""Files and names in the pages on diagnosis exist in the package."""
 
 import importlib
 import re
@@ -16,7 +16,7 @@ PAGES = (
 
 
 def missing(text: str) -> list[str]:
-    """Files and names of the package that a page tells of and that are not there."""
+    """Files and names in a page that are missing in the package."""
     modules: dict[str, list[str]] = {}
     for path in sorted(PACKAGE.rglob("*.py")):
         whole = ".".join(path.relative_to(ROOT).with_suffix("").parts)
@@ -30,9 +30,9 @@ def missing(text: str) -> list[str]:
 
 
 @pytest.mark.parametrize("page", PAGES)
-def test_names(page):
+def test_names_in_the_pages_exist(page):
     assert missing((ROOT / page).read_text()) == []
 
 
-def test_a_name_that_is_gone_is_found():
+def test_missing_name_is_found():
     assert missing("`nowhere.py` `edges.py` `fits.CEILING` `decide.FORM`") == ["nowhere.py", "fits.CEILING"]

@@ -1,4 +1,4 @@
-"""The page on a machine of one's own: its commands, in one folder, in the order of the page."""
+"""Manual page on user machines: its commands run in one folder, in order."""
 
 import os
 import shlex
@@ -10,7 +10,7 @@ from rtctl.cli.main import main
 PAGE = ROOT / "docs" / "bring_your_own_machine.md"
 
 
-def test_the_commands_of_the_page_run(runtime, tmp_path, monkeypatch, capsys):
+def test_commands_of_the_page_on_user_machines_run(runtime, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     said: dict[str, str] = {}
     for line in (line for block in blocks(PAGE) for _, line in commands(block)):

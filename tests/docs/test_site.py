@@ -1,4 +1,4 @@
-"""The site builds without a warning, and what it is made of is all in its navigation."""
+"""The site builds without a warning, and every page is in its navigation."""
 
 import os
 import shutil
@@ -10,7 +10,7 @@ import yaml
 from manual_blocks import ROOT
 
 
-def test_site(tmp_path):
+def test_site_builds_without_a_warning(tmp_path):
     pytest.importorskip("material", reason="mkdocs-material is not installed: pip install 'rtctl[docs]'")
     done = subprocess.run(
         [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(tmp_path / "site")],
@@ -28,7 +28,7 @@ def test_site(tmp_path):
 
 
 def first_of_search(url, words):
-    """The first that the site's search finds on a page that lies on the disk, where there is a browser."""
+    """First search result of a page on disk; needs a browser."""
     browser = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
     if browser is None:
         pytest.skip("the rest needs a browser: apt-get install chromium")

@@ -17,18 +17,18 @@ from manual_blocks import ROOT, blocks, commands
 
 LIVE = "runs on the wall clock until somebody ends it; tests/cli/test_live.py and tests/scope do that"
 NOT_RUN = {"rtctl run ivu --reference steps": LIVE, "rtctl scope ivu --control": LIVE}
-ENDPOINT = re.compile(r"tcp://127\.0\.0\.1:\d+")  # a port may be taken; a socket in our own folder is not
+ENDPOINT = re.compile(r"tcp://127\.0\.0\.1:\d+")  # replaced by a socket in a temporary folder
 HEADING = re.compile(r"^## (\d)\. ", re.M)
-DIAGNOSED = 4  # section of the reel unit's page whose figures come from fits: near those of the page, not to the digit
+DIAGNOSED = 4  # section of the reel unit with fitted figures: compared with a tolerance
 
 
 def words(text):
-    """The words of a text, so that neither columns nor where lines are broken count; a hash has a salt."""
+    """Words of a text, without column widths, line breaks and salted hashes."""
     return re.sub(r"sha256 \w+(\.\.\.)?", "sha256", " ".join(text.split()))
 
 
 class Tutorial:
-    """A page of the manual, played in `folder`. `said` holds what each section printed."""
+    """A page of the manual, run in `folder`. `said` holds the output of each section."""
 
     def __init__(self, page, folder, runtime):
         text = (ROOT / "docs" / page).read_text()
@@ -41,13 +41,13 @@ class Tutorial:
         self.environment = {**os.environ, "COLUMNS": "120"}
 
     def through(self, number):
-        """What section `number` prints; those before it are played first, if they were not."""
+        """Output of section `number`; earlier sections are run first."""
         while len(self.said) < number:
             self.said.append(self._section(self.sections[len(self.said)]))
         return self.said[number - 1]
 
     def told(self, number):
-        """The blocks of section `number` that show what is printed."""
+        """Output blocks of section `number`."""
         return [block.text for block in self.sections[number - 1] if block.language == "text"]
 
     def _section(self, section):
@@ -58,7 +58,7 @@ class Tutorial:
 
     def _run(self, line):
         given = shlex.split(ENDPOINT.sub(self.endpoint, line))[1:]
-        if given[0] == "run":  # under a name of its own: another of the page's name may run here
+        if given[0] == "run":  # unique name: a machine with the name of the page may run here
             given += ["--set", f"name={self.name}"]
         command = [sys.executable, "-m", "rtctl.cli.main", *given]
         if "--conceal" in given:
@@ -70,7 +70,7 @@ class Tutorial:
         return done.stdout.replace(self.name, given[1])
 
     def _start(self, command):
-        """The plant in a terminal of its own, until it says that it listens."""
+        """Start the plant in a separate process; returns when the plant listens."""
         log = self.folder / "plant.log"
         with log.open("w") as file:
             self.plant = subprocess.Popen(command, cwd=self.folder, env=self.environment, stdout=subprocess.PIPE,
@@ -81,7 +81,7 @@ class Tutorial:
             assert said, log.read_text()
 
     def close(self):
-        """Ctrl-C for the plant, as the page says at the end of the section."""
+        """Stop the plant with Ctrl-C, as at the end of the section."""
         if self.plant is not None:
             self.plant.send_signal(signal.SIGINT)
             self.plant.communicate(timeout=60)
@@ -99,7 +99,7 @@ def linear_drive(runtime, tmp_path_factory):
 
 
 @pytest.mark.parametrize("number", [1, 2, 3])
-def test_the_reel_unit_prints_what_the_page_says(reel_unit, number):
+def test_reel_unit_tutorial_prints_the_documented_output(reel_unit, number):
     said = words(reel_unit.through(number))
     for text in reel_unit.told(number):
         assert words(text) in said
@@ -107,7 +107,7 @@ def test_the_reel_unit_prints_what_the_page_says(reel_unit, number):
     assert (reel_unit.folder / made).exists()
 
 
-def test_the_recording_does_not_know_what_is_hidden(reel_unit):
+def test_recording_does_not_contain_the_hidden_effect(reel_unit):
     reel_unit.through(3)
     case = json.loads((reel_unit.folder / "runs/monday/case.json").read_text())
     assert "asymmetry" not in json.dumps(case["config"]["plant"])
@@ -117,7 +117,7 @@ def test_the_recording_does_not_know_what_is_hidden(reel_unit):
     assert [abs(float(step[3])) for step in steps] == pytest.approx([full, half], abs=6e-4)
 
 
-def test_the_reel_unit_is_diagnosed(reel_unit):
+def test_reel_unit_tutorial_diagnoses_the_hidden_effect(reel_unit):
     said = words(reel_unit.through(DIAGNOSED))
     answer, seal = (words(text) for text in reel_unit.told(DIAGNOSED))
     assert seal in said
@@ -129,7 +129,7 @@ def test_the_reel_unit_is_diagnosed(reel_unit):
     assert {"report.html", "model.yaml"} <= {path.name for path in folder.iterdir()}
 
 
-def test_the_model_that_was_found_is_better_by_as_much_as_the_page_says(reel_unit):
+def test_diagnosed_model_improves_as_documented(reel_unit):
     said = reel_unit.through(5)
     page = (ROOT / "docs" / "tutorial_ivu.md").read_text()
     table = re.findall(r"^\| `(?:ivu|model\.yaml)`.*\| ([\d.]+) \| ([\d.]+) \| ([\d.]+) \|$", page, re.M)
@@ -144,7 +144,7 @@ def test_the_model_that_was_found_is_better_by_as_much_as_the_page_says(reel_uni
 
 
 @pytest.mark.parametrize("number", [1, 2, 3, 4])
-def test_the_linear_drive_prints_what_the_page_says(linear_drive, number):
+def test_linear_drive_tutorial_prints_the_documented_output(linear_drive, number):
     said = words(linear_drive.through(number))
     for text in linear_drive.told(number):
         assert words(text) in said
@@ -153,14 +153,14 @@ def test_the_linear_drive_prints_what_the_page_says(linear_drive, number):
 
 
 @pytest.mark.parametrize("page", ["tutorial_ivu.md", "tutorial_ldu.md"])
-def test_no_command_of_a_tutorial_stands_outside_its_sections(page):
+def test_every_tutorial_command_is_in_a_section(page):
     text = (ROOT / "docs" / page).read_text()
     before = text[: HEADING.search(text).start()]
     after = text[list(HEADING.finditer(text))[-1].start() :].partition("\n## ")[2]
     assert not [line for part in (before, after) for b in blocks(ROOT / "docs" / page, part) for line in commands(b)]
 
 
-def test_what_is_not_run_is_in_a_page():
+def test_skipped_commands_exist_in_a_page():
     pages = [ROOT / "docs" / page for page in ("tutorial_ivu.md", "tutorial_ldu.md")]
     lines = {line for page in pages for block in blocks(page) for _, line in commands(block)}
     assert NOT_RUN.keys() <= lines

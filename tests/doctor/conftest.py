@@ -1,4 +1,4 @@
-"""A machine made of files."""
+"""Fixtures: a machine emulated by files."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -13,7 +13,7 @@ from rtctl.loop import histogram
 
 @pytest.fixture
 def tree(tmp_path: Path) -> Callable[..., Tree]:
-    """`tree({"proc/swaps": "..."})` is a machine with these files and no others."""
+    """`tree({"proc/swaps": "..."})`: a machine with these files only."""
 
     def make(files: dict[str, str] | None = None) -> Tree:
         for name, text in (files or {}).items():
@@ -27,7 +27,7 @@ def tree(tmp_path: Path) -> Callable[..., Tree]:
 
 @pytest.fixture
 def lateness() -> Callable[..., Lateness]:
-    """`lateness({15_000: 90, 60_000: 10}, late=10)`: wake-ups by ns, as our loop counts them."""
+    """`lateness({15_000: 90, 60_000: 10}, late=10)`: counts of wake-ups by lateness, ns."""
 
     def make(wakeups: dict[int, int], late: int | None = 0, skipped: int | None = 0) -> Lateness:
         record = np.zeros(1, histogram.HISTOGRAM)[0]

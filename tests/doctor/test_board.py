@@ -22,7 +22,7 @@ ENCODER, SCALE = 106_103, 200_000  # counts for 100 mm: 5.3 turns of 20000, 0.5 
 
 
 class Hands:
-    """Somebody who does at each step what a test says, by name; says yes to all else."""
+    """Stub of the operator: the actions of a test by step name; answers yes to every other step."""
 
     def __init__(self, does, says=True):
         self.does, self.says = does, says
@@ -38,7 +38,7 @@ class Hands:
 
 
 def turn(rig, channel, sensor, pulses):
-    """A reel turned by hand past its sensor, read all the while."""
+    """A reel turned by hand past its sensor, with reads during the turn."""
     p = optical_sensor.build(sensor, 1.0)
 
     def act(read):
@@ -87,7 +87,7 @@ def right(settings, rig):
     }
 
 
-def test_a_machine_that_is_wired_right_passes(ivu):
+def test_correctly_wired_machine_passes(ivu):
     settings, rig = ivu
     found = checks(settings, rig, right(settings, rig))
     assert set(verdicts(found).values()) == {"good"}
@@ -107,7 +107,7 @@ def test_a_machine_that_is_wired_right_passes(ivu):
         ("reel2", lambda rig, s: turn(rig, 1, s.sensors.reel2, 2), "2 pulses"),
     ],
 )
-def test_what_is_wired_wrong_is_found_and_said(ivu, name, act, words):
+def test_wiring_error_is_found_and_reported(ivu, name, act, words):
     settings, rig = ivu
     found = checks(settings, rig, {**right(settings, rig), name: act(rig, settings)})
     assert [n for n, verdict in verdicts(found).items() if verdict == "bad"] == [name]
@@ -116,7 +116,7 @@ def test_what_is_wired_wrong_is_found_and_said(ivu, name, act, words):
     assert bad.change.startswith("right is: ")
 
 
-def test_an_input_that_jumps_while_nobody_touches_anything_is_bad(ivu):
+def test_input_that_jumps_at_rest_is_bad(ivu):
     settings, rig = ivu
     noise = iter([0.0, 0.5, 0.1] * 10_000)
     read = rig.card._read_volts
@@ -124,7 +124,7 @@ def test_an_input_that_jumps_while_nobody_touches_anything_is_bad(ivu):
     assert verdicts(checks(settings, rig, right(settings, rig)))["rest"] == "bad"
 
 
-def test_the_scale_and_the_encoder_of_the_ldu_against_each_other(config):
+def test_ldu_scale_and_encoder_are_compared(config):
     settings = config("ldu", mode="real")
     rig = rigs.emulated(wiring(settings))
     rig.card.open()
@@ -139,7 +139,7 @@ def test_the_scale_and_the_encoder_of_the_ldu_against_each_other(config):
     assert found[-1].verdict == "bad"
 
 
-def test_without_a_person_only_the_rest_is_judged_and_the_others_say_what_to_do(ivu):
+def test_unattended_check_judges_the_rest_state_and_lists_the_manual_steps(ivu):
     settings, rig = ivu
     found = board.run(settings, rig.card, None, lambda _: None)
     assert verdicts(found) == {
@@ -148,13 +148,13 @@ def test_without_a_person_only_the_rest_is_judged_and_the_others_say_what_to_do(
     assert all(f.change for f in found if f.verdict == "unknown")
 
 
-def test_a_person_who_says_no_is_believed(ivu):
+def test_negative_answer_of_the_operator_is_a_bad_verdict(ivu):
     settings, rig = ivu
     assert verdicts(checks(settings, rig, {}, says=False))["emergency stop"] == "bad"
     assert verdicts(checks(settings, rig, {}, says=None))["emergency stop"] == "unknown"
 
 
-def test_nothing_but_zero_is_ever_written(ivu):
+def test_wiring_check_writes_only_zero_outputs(ivu):
     settings, rig = ivu
     written = []
     write = rig.card._write_code
@@ -164,20 +164,20 @@ def test_nothing_but_zero_is_ever_written(ivu):
     assert len(written) > 10
 
 
-def test_a_card_that_fails_on_the_way_is_an_error(ivu):
+def test_card_failure_during_the_check_is_an_error(ivu):
     settings, rig = ivu
     rig.fail("counters")
     with pytest.raises(BoardError, match="pulled out"):
         checks(settings, rig, right(settings, rig))
 
 
-def test_an_emulated_board_has_no_wires(config):
+def test_emulated_board_has_no_wiring_check(config):
     with pytest.raises(UserError, match="has an emulated board, which has no wires"):
         board.card_of(config("ivu"))
 
 
 class Keyboard:
-    """A terminal's lines out of a pipe, so that waiting for one works."""
+    """Terminal lines from a pipe, so a wait for input works."""
 
     def __init__(self, text):
         reading, writing = os.pipe()
@@ -195,7 +195,7 @@ STEP = Step("capstan", "Turn the capstan.", "one turn", lambda samples: ("", Tru
 
 
 @pytest.mark.parametrize(("text", "done"), [("\n", True), ("s\n", False), ("", False)])
-def test_enter_ends_a_step_and_s_leaves_it_out(console, text, done):
+def test_enter_ends_a_step_and_s_skips_it(console, text, done):
     seen = []
 
     def read():
@@ -210,19 +210,19 @@ def test_enter_ends_a_step_and_s_leaves_it_out(console, text, done):
 
 
 @pytest.mark.parametrize(("text", "said"), [("y\n", True), ("what\nno\n", False), ("s\n", None), ("", None)])
-def test_a_question_is_asked_until_it_is_answered(console, text, said):
+def test_question_is_repeated_until_answered(console, text, said):
     keyboard = Keyboard(text)
     assert board_console.Terminal(console, keyboard.file).confirm(STEP) is said
     keyboard.file.close()
 
 
-def test_findings_are_told_with_what_would_be_right(console):
+def test_findings_are_printed_with_the_correct_wiring(console):
     board_console.tell(console, Finding("capstan", "-9 counts", "bad", "", "right is: +10000 counts"))
     assert console.file.getvalue().split() == ["bad", "capstan:", "-9", "counts", "right", "is:", "+10000", "counts"]
 
 
 @pytest.mark.parametrize(("turns", "good"), [(0.5, True), (-0.5, False), (0.0, False)])
-def test_a_described_machine_on_a_bus_is_moved_by_hand_and_has_no_terminals(turns, good):
+def test_described_machine_on_a_bus_is_checked_by_hand_without_terminals(turns, good):
     from odrive_nodes import Nodes, pair
 
     from rtctl.cli.common import load_config

@@ -31,37 +31,37 @@ def shown(findings, measured, width, encoding="utf-8", terminal=False):
 
 
 @pytest.mark.parametrize("width", [30, 44, 80, 200])
-def test_everything_is_said_at_any_width(measured, width):
+def test_report_is_complete_at_any_width(measured, width):
     out = shown(FINDINGS, measured, width)
     words = " ".join(out.split())
     for text in ("bench: Linux 6.12", "This machine cannot hold 10 kHz", "10 of 9010 ticks", "no SCHED_FIFO: slow",
                  "cyclictest at 10 kHz", "What to change"):  # fmt: skip
         assert text in words
-    assert LONG in out  # in one piece, to be copied
+    assert LONG in out  # in one piece, for copying
     wide = [line for line in out.splitlines() if len(line) > width and LONG not in line]
     assert wide == []
 
 
-def test_what_stands_in_brackets_is_not_markup():
+def test_text_in_brackets_is_not_markup():
     assert "refused [at] 80" in shown(FINDINGS, None, 80)
 
 
-def test_no_colour_where_there_is_no_terminal(measured):
+def test_no_colour_without_a_terminal(measured):
     assert "\x1b" not in shown(FINDINGS, measured, 80)
     assert "\x1b[" in shown(FINDINGS, measured, 80, terminal=True)
 
 
-def test_no_colour_where_it_is_not_wanted(measured, monkeypatch):
+def test_no_colour_with_the_no_color_setting(measured, monkeypatch):
     monkeypatch.setenv("NO_COLOR", "1")
     assert "\x1b[3" not in shown(FINDINGS, measured, 80, terminal=True)
 
 
-def test_a_terminal_without_blocks(measured):
+def test_terminal_without_block_characters_gets_ascii(measured):
     out = shown(FINDINGS, measured, 80, encoding="ascii")
     assert "#" in out
 
 
-def test_why_there_is_no_cyclictest(measured):
+def test_missing_cyclictest_is_explained(measured):
     alone = measured._replace(
         rates=[measured.rates[0]._replace(cyclictest=None)], without="cyclictest is not installed"
     )
@@ -69,11 +69,11 @@ def test_why_there_is_no_cyclictest(measured):
     assert "cyclictest is not installed" in out and "cyclictest at" not in out
 
 
-def test_a_machine_with_nothing_to_change():
+def test_machine_with_nothing_to_change():
     assert "Nothing to change" in shown([Finding("SMT", "off", "good")], None, 80)
 
 
-def test_progress_is_silent_where_nobody_looks(capsys):
+def test_no_progress_output_without_a_terminal(capsys):
     with console.progress(quiet=False) as say:
         say(0.5, "rtctl at 500 Hz")
     assert capsys.readouterr() == ("", "")

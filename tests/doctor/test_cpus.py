@@ -24,7 +24,7 @@ def isolated(cpu: str, cmdline: str = "quiet", tickless: str = "") -> dict[str, 
         ({}, "unknown", "hidden"),
     ],
 )
-def test_count(tree, files, verdict, found):
+def test_cpu_count_finding(tree, files, verdict, found):
     said = cpus.count(tree(files))
     assert (said.verdict, found in said.found) == (verdict, True)
     assert bool(said.change) == (verdict in ("fair", "bad"))
@@ -41,19 +41,19 @@ def test_count(tree, files, verdict, found):
         (status("0-3"), "unknown"),
     ],
 )
-def test_isolation(tree, files, verdict):
+def test_cpu_isolation_finding(tree, files, verdict):
     said = cpus.isolation(tree(files))
     assert said.verdict == verdict
     assert ("isolcpus=managed_irq,domain,3" in said.command) == (verdict == "fair")
     assert ("loop.cpu: 3" in said.change) == (verdict != "unknown")
 
 
-def test_one_cpu_cannot_be_isolated(tree):
+def test_single_cpu_cannot_be_isolated(tree):
     said = cpus.isolation(tree({**status("0"), **isolated("")}))
     assert (said.verdict, said.command) == ("fair", "")
 
 
-def test_where_a_loop_belongs(tree):
+def test_recommended_cpu_of_the_loop(tree):
     assert cpus.loop_cpu(tree()) is None
     t = tree(status("0-2"))
     assert cpus.loop_cpu(t) == 2
@@ -74,6 +74,6 @@ def test_where_a_loop_belongs(tree):
         ({}, "unknown", "hidden"),
     ],
 )  # fmt: skip
-def test_threads(tree, files, verdict, found):
+def test_smt_finding(tree, files, verdict, found):
     said = cpus.threads(tree(files))
     assert (said.verdict, found in said.found) == (verdict, True)

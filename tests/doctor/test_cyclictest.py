@@ -20,12 +20,12 @@ def report(histogram: dict[int, int], cycles: int | None = None, longest: int = 
     return {"thread": {"0": thread}}
 
 
-def test_reads_wakeups_in_order():
+def test_cyclictest_wakeups_are_read_in_order():
     w = cyclictest.read(report({20_000: 1, 9_000: 3}))
     assert (w.ns.tolist(), w.hits.tolist(), w.wakeups, w.max_ns) == ([9_000, 20_000], [3, 1], 4, 20_000)
 
 
-def test_what_is_later_than_the_last_bucket_counts():
+def test_wakeups_beyond_the_last_bucket_count():
     w = cyclictest.read(report({9_000: 8}, cycles=10, longest=5_000_000))
     assert (w.wakeups, w.later_than(9_000), w.later_than(1_000_000)) == (10, 2, 2)
     assert w.later_than(2_000_000) is None
@@ -35,19 +35,19 @@ def test_what_is_later_than_the_last_bucket_counts():
 
 
 @pytest.mark.parametrize("broken", [{}, {"thread": {}}, report({1: 1}) | {"thread": {"0": {"histogram": {}}}}])
-def test_a_report_of_another_shape(broken):
+def test_cyclictest_report_of_another_format_is_refused(broken):
     with pytest.raises(KeyError):
         cyclictest.read(broken)
 
 
-def test_a_report_without_a_wakeup():
+def test_cyclictest_report_without_wakeups_is_refused():
     with pytest.raises(ValueError, match="no wake-up"):
         cyclictest.read({"thread": {"0": {"histogram": {}, "cycles": 0, "max": 0}}})
 
 
 @settings(deadline=None)
 @given(st.lists(st.integers(0, cyclictest.LONGEST_NS - 1), min_size=1, max_size=60), st.integers(0, 10**6))
-def test_against_the_sorted_values(values, limit):
+def test_percentiles_agree_with_the_sorted_values(values, limit):
     ns, hits = np.unique(values, return_counts=True)
     w = cyclictest.Window(ns, hits, max(values))
     assert w.later_than(limit) == sum(v > limit for v in values)
@@ -58,20 +58,20 @@ def test_against_the_sorted_values(values, limit):
 
 @settings(deadline=None)
 @given(st.lists(st.dictionaries(st.integers(0, 50), st.integers(1, 9), min_size=1), min_size=1, max_size=5))
-def test_windows_together_are_their_sum(windows):
+def test_joined_windows_are_the_sum_of_their_counts(windows):
     w = cyclictest.together([cyclictest.read(report(h)) for h in windows])
     for ns in range(51):
         assert w.hits[w.ns == ns].sum() == sum(h.get(ns, 0) for h in windows)
     assert w.max_ns == max(max(h) for h in windows)
 
 
-def test_missing(monkeypatch):
+def test_missing_cyclictest_is_reported(monkeypatch):
     monkeypatch.setattr(shutil, "which", lambda name: None)
     assert "rt-tests" in (cyclictest.missing() or "")
 
 
 @pytest.mark.parametrize("lock", [True, False])
-def test_how_it_is_called(monkeypatch, tmp_path, lock):
+def test_cyclictest_command_line(monkeypatch, tmp_path, lock):
     called = []
 
     def run(command, **_):
@@ -86,7 +86,7 @@ def test_how_it_is_called(monkeypatch, tmp_path, lock):
 
 
 @pytest.mark.realtime
-def test_the_real_one(tmp_path):
+def test_cyclictest_of_this_machine(tmp_path):
     if cyclictest.missing():
         pytest.skip(str(cyclictest.missing()))
     if not rights.may_fifo(80):

@@ -4,7 +4,7 @@ from rtctl.doctor.finding import Finding
 STOLEN = Finding("stolen time", "none", "good")
 
 
-def test_a_machine_that_hides_everything(tree):
+def test_machine_without_readable_files_gives_unknown_verdicts(tree):
     found = facts.facts(tree(), 80, True, virtual.steal(None, None, ""))
     assert len({f.name for f in found}) == len(found) == len(facts.CHECKS) + 2
     assert {f.name: f.verdict for f in found}.pop("SCHED_FIFO") == "good"
@@ -12,7 +12,7 @@ def test_a_machine_that_hides_everything(tree):
     assert facts.changes(found) == []
 
 
-def test_every_verdict_that_is_not_good_says_what_it_costs_and_how_to_change_it(tree):
+def test_every_verdict_that_is_not_good_names_its_cost_and_its_remedy(tree):
     files = {
         "proc/sys/kernel/version": "#1 SMP",
         "proc/self/limits": "Max locked memory   1024  1024 bytes\n",
@@ -21,11 +21,11 @@ def test_every_verdict_that_is_not_good_says_what_it_costs_and_how_to_change_it(
         "proc/cmdline": "",
     }
     for f in facts.facts(tree(files), 80, False, STOLEN):
-        if f.verdict in ("fair", "bad") and f.name != "isolated CPUs":  # of one CPU none can be kept free
+        if f.verdict in ("fair", "bad") and f.name != "isolated CPUs":  # a single CPU cannot be isolated
             assert f.cost and f.change and f.command, f
 
 
-def test_what_is_bad_comes_first_and_then_the_order_of_the_checks():
+def test_bad_findings_come_first_then_the_order_of_the_checks():
     found = [
         Finding("a", "", "fair", change="x"),
         Finding("b", "", "bad", change="x"),

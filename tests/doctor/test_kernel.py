@@ -34,14 +34,14 @@ DYNAMIC = "#1 SMP PREEMPT_DYNAMIC Debian 6.12"
         ({}, "unknown", "hidden"),
     ],
 )
-def test_preemption(tree, files, verdict, found):
+def test_preemption_finding(tree, files, verdict, found):
     said = kernel.preemption(tree(files))
     assert said.verdict == verdict
     assert found in said.found
     assert bool(said.command) == (verdict != "good")
 
 
-def test_what_is_set_counts_more_than_what_is_the_default(tree, tmp_path):
+def test_boot_option_overrides_the_default_preemption(tree, tmp_path):
     t = tree({VERSION: DYNAMIC, "proc/cmdline": "preempt=full"})
     (tmp_path / "proc/config.gz").write_bytes(gzip.compress(b"CONFIG_PREEMPT_NONE=y\n# CONFIG_PREEMPT is not set\n"))
     assert kernel.preemption(t).verdict == "fair"
@@ -50,7 +50,7 @@ def test_what_is_set_counts_more_than_what_is_the_default(tree, tmp_path):
     assert (said.verdict, "preempt=full" in said.change) == ("bad", True)
 
 
-def test_no_preempt_option_for_a_kernel_that_has_none(tree):
+def test_no_preempt_remedy_for_a_kernel_without_the_option(tree):
     assert "preempt=full" not in kernel.preemption(tree({VERSION: "#1 SMP 5.10"})).change
 
 
@@ -64,21 +64,21 @@ def test_no_preempt_option_for_a_kernel_that_has_none(tree):
         ("hpet", "hpet acpi_pm", "bad", "dmesg"),
     ],
 )
-def test_clock_source(tree, current, available, verdict, command):
+def test_clock_source_finding(tree, current, available, verdict, command):
     files = {f"{CLOCK}/current_clocksource": f"{current}\n", f"{CLOCK}/available_clocksource": f"{available} \n"}
     said = kernel.clock_source(tree(files))
     assert (said.verdict, said.found) == (verdict, current)
     assert said.command.startswith(command)
 
 
-def test_hidden_clock_source(tree):
+def test_unreadable_clock_source_is_unknown(tree):
     assert kernel.clock_source(tree()).verdict == "unknown"
 
 
 @pytest.mark.parametrize(
     ("runtime", "verdict"), [("-1", "good"), ("950000", "good"), ("500000", "fair"), ("0", "bad"), ("", "unknown")]
 )
-def test_throttling(tree, runtime, verdict):
+def test_throttling_finding(tree, runtime, verdict):
     files = {"proc/sys/kernel/sched_rt_runtime_us": runtime, "proc/sys/kernel/sched_rt_period_us": "1000000"}
     said = kernel.throttling(tree(files))
     assert said.verdict == verdict

@@ -16,7 +16,7 @@ OURS = {"late": 2, "skipped": 3, "max": 400_000, "bucket": [40, 90], "count": [9
 
 @pytest.fixture
 def windows(monkeypatch) -> list[str]:
-    """Who was measured, in order; nothing sleeps."""
+    """Measured windows in order; the measurements are stubbed."""
     order: list[str] = []
 
     class Sleeper:
@@ -49,7 +49,7 @@ def run(seconds: int = 2, fifo: bool = True, say: Callable[[float, str], None] =
     return measure.measure([500.0, 10_000.0], seconds, 1, 80, fifo, True, say)
 
 
-def test_windows_alternate_and_change_places(windows):
+def test_windows_alternate_and_swap_order_each_round(windows):
     said: list[tuple[float, str]] = []
     m = run(2, say=lambda share, word: said.append((share, word)))
     assert windows == [
@@ -62,13 +62,13 @@ def test_windows_alternate_and_change_places(windows):
 
 
 @pytest.mark.parametrize(("seconds", "rounds", "window"), [(1, 1, 1), (5, 5, 1), (60, 5, 12), (7, 7, 1), (8, 4, 2)])
-def test_as_long_as_asked_for(windows, seconds, rounds, window):
+def test_measurement_has_the_requested_length(windows, seconds, rounds, window):
     m = run(seconds)
     assert (m.rounds, m.window_s) == (rounds, window)
     assert len(windows) == 4 * rounds
 
 
-def test_all_windows_count(windows):
+def test_all_windows_are_summed(windows):
     rate = run(2).rates[1]
     assert (rate.ours.ticks, rate.ours.late, rate.ours.skipped) == (2 * 98, 4, 6)
     assert (rate.late, rate.held, rate.ours.us["max"]) == (10, False, 400.0)
@@ -78,14 +78,14 @@ def test_all_windows_count(windows):
     assert rate.cyclictest.record["bucket"].sum() == 200
 
 
-def test_half_a_period_is_that_of_the_rate(windows):
+def test_late_threshold_is_half_the_period_of_each_rate(windows):
     slow, fast = run(1).rates
     assert slow.cyclictest is not None and fast.cyclictest is not None
     assert (slow.cyclictest.late, fast.cyclictest.late) == (0, 1)
 
 
 @pytest.mark.parametrize(("late", "held"), [(0, True), (10, True), (11, False)])
-def test_a_rate_is_held_with_a_thousandth_late(lateness, late, held):
+def test_rate_is_held_with_a_thousandth_of_late_ticks(lateness, late, held):
     assert measure.Rate(1000.0, lateness({9_000: 10_000}, late=late), None).held is held
 
 
@@ -94,7 +94,7 @@ def test_skipped_ticks_are_late(lateness):
     assert (measure.Rate(1000.0, ours, None).late, measure.Rate(1000.0, ours, None).held) == (21, False)
 
 
-def test_cyclictest_missing(windows, monkeypatch):
+def test_measurement_without_cyclictest(windows, monkeypatch):
     monkeypatch.setattr(cyclictest, "missing", lambda: "cyclictest is not installed here")
     m = run()
     assert m.without == "cyclictest is not installed here"
@@ -102,7 +102,7 @@ def test_cyclictest_missing(windows, monkeypatch):
     assert {who.split()[0] for who in windows} == {"rtctl"}
 
 
-def test_without_fifo_there_is_no_cyclictest(windows):
+def test_cyclictest_is_skipped_without_fifo(windows):
     m = run(fifo=False)
     assert "SCHED_FIFO" in (m.without or "")
     assert {who.split()[0] for who in windows} == {"rtctl"}
@@ -116,7 +116,7 @@ def test_without_fifo_there_is_no_cyclictest(windows):
         (ValueError("it counted no wake-up"), "no wake-up"),
     ],
 )
-def test_cyclictest_that_fails_on_the_way(windows, monkeypatch, error, words):
+def test_cyclictest_failure_during_the_measurement_is_reported(windows, monkeypatch, error, words):
     def fail(*_):
         raise error
 
@@ -129,7 +129,7 @@ def test_cyclictest_that_fails_on_the_way(windows, monkeypatch, error, words):
 
 @settings(deadline=None, max_examples=60)
 @given(st.lists(st.integers(0, 2**37 - 1), min_size=1, max_size=50))
-def test_edges_are_those_of_the_loops_histogram(values):
+def test_bucket_edges_are_those_of_the_loop_histogram(values):
     h = np.zeros(1, histogram.HISTOGRAM)[0]
     for value in values:
         h["bucket"][histogram._index.py_func(value)] += 1
@@ -137,7 +137,7 @@ def test_edges_are_those_of_the_loops_histogram(values):
     assert np.array_equal(np.bincount(mine, minlength=histogram.BUCKETS), h["bucket"])
 
 
-def test_words():
+def test_rate_labels():
     assert [measure.words(hz) for hz in (500.0, 1000.0, 10_000.0, 12_500.0)] == [
         "500 Hz",
         "1 kHz",

@@ -13,7 +13,7 @@ HEAD = "Filename\t\t\t\tType\t\tSize\n"
         ({}, "unknown", "hidden"),
     ],
 )
-def test_swap(tree, files, verdict, found):
+def test_swap_finding(tree, files, verdict, found):
     said = memory.swap(tree(files))
     assert (said.verdict, found in said.found) == (verdict, True)
     assert ("swapoff" in said.command) == (verdict == "fair")
@@ -28,7 +28,7 @@ def test_swap(tree, files, verdict, found):
         (None, "unknown"),
     ],
 )
-def test_huge_pages(tree, text, verdict):
+def test_huge_pages_finding(tree, text, verdict):
     said = memory.huge_pages(tree({memory.THP: text} if text else {}))
     assert said.verdict == verdict
     assert ("echo madvise" in said.command) == (verdict == "fair")

@@ -27,23 +27,23 @@ def states(**latencies: int) -> dict[str, str]:
         ((), "unknown", "no cpufreq"),
     ],
 )
-def test_governor(tree, kinds, verdict, found):
+def test_governor_finding(tree, kinds, verdict, found):
     said = power.governor(tree(governors(*kinds)))
     assert (said.verdict, found in said.found) == (verdict, True)
     assert ("performance" in said.command) == (verdict == "fair")
 
 
-def test_shallow_states_need_nothing(tree):
+def test_shallow_idle_states_need_no_change(tree):
     assert power.idle_states(tree(states(POLL=0, C1=2))).verdict == "good"
 
 
-def test_deep_states_that_we_may_keep_it_from(tree):
+def test_deep_idle_states_can_be_prevented_with_access(tree):
     said = power.idle_states(tree({**states(POLL=0, C6=133), "dev/cpu_dma_latency": ""}))
     assert (said.verdict, "C6 133 us" in said.found) == ("good", True)
 
 
 @pytest.mark.parametrize(("opens", "found"), [(False, "may not be opened"), (None, "is missing")])
-def test_deep_states_that_we_may_not(tree, monkeypatch, opens, found):
+def test_deep_idle_states_without_access_are_reported(tree, monkeypatch, opens, found):
     monkeypatch.setattr(Tree, "opens", lambda self, path: opens)
     said = power.idle_states(tree(states(POLL=0, C1=2, C6=133)))
     assert (said.verdict, found in said.found, "133 us" in said.cost) == ("bad", True, True)
@@ -52,10 +52,10 @@ def test_deep_states_that_we_may_not(tree, monkeypatch, opens, found):
     assert said.verdict == "fair"
 
 
-def test_a_state_that_is_switched_off_does_not_count(tree):
+def test_disabled_idle_state_does_not_count(tree):
     files = states(POLL=0, C6=133)
     assert power.idle_states(tree({**files, f"{CPU}/cpu0/cpuidle/state1/disable": "1"})).verdict == "good"
 
 
-def test_hidden_states(tree):
+def test_unreadable_idle_states_are_unknown(tree):
     assert power.idle_states(tree()).verdict == "unknown"

@@ -19,26 +19,26 @@ def measured(lateness):
     return Measured([slow, fast], 1, 80, 1, 5, [], "cyclictest is not installed here")
 
 
-def test_sentence_of_a_rate_that_held(measured):
+def test_sentence_for_a_held_rate(measured):
     assert report.sentence(measured.rates[0]) == (
         "This machine can hold 500 Hz: a wake-up later than half a period (1000 us) happened in 0 of 2500 ticks."
     )
 
 
-def test_sentence_of_a_rate_that_did_not(measured):
+def test_sentence_for_a_rate_that_was_not_held(measured):
     assert report.sentence(measured.rates[1]) == (
         "This machine cannot hold 10 kHz: a wake-up later than half a period (50 us) happened in 200 of 50000 ticks "
         "(0.4 %)."
     )
 
 
-def test_figures(lateness):
+def test_report_figures(lateness):
     said = report.figures(lateness({15_000: 990, 250_000: 10}, late=4, skipped=2))
     assert said.startswith("p50 15.") and said.endswith("max 250 us; 4 of 1002 late, 2 skipped")
     assert "late" not in report.figures(lateness({15_000: 1}, late=None, skipped=None))
 
 
-def test_everything_is_in_the_json(tree, measured):
+def test_json_report_is_complete(tree, measured):
     t = tree({"proc/sys/kernel/hostname": "bench", "proc/sys/kernel/osrelease": "6.12"})
     found = json.loads(json.dumps(report.as_json(t, FINDINGS, measured, 10_000.0)))
     assert (found["host"], found["kernel"], found["change"]) == ("bench", "6.12", ["swap"])
@@ -59,12 +59,12 @@ def test_everything_is_in_the_json(tree, measured):
     assert low <= 15 < 1.04 * low and high <= 90 < 1.04 * high
 
 
-def test_without_a_measurement(tree):
+def test_report_without_a_measurement(tree):
     found = report.as_json(tree(), facts.facts(tree(), 80, True, FINDINGS[1]), None, None)
     assert (found["measured"], found["need"], found["host"]) == (None, None, None)
 
 
-def test_title(tree):
+def test_report_title(tree):
     assert report.title(tree()) == "this machine: Linux ?"
     t = tree({f"proc/sys/kernel/{k}": v for k, v in (("hostname", "a"), ("osrelease", "6.1"), ("version", "#1 SMP"))})
     assert report.title(t) == "a: Linux 6.1 #1 SMP"

@@ -22,20 +22,20 @@ intr 1 2 3
         ({}, "unknown", "does not tell"),
     ],
 )
-def test_machine(tree, files, verdict, found):
+def test_virtual_machine_finding(tree, files, verdict, found):
     said = virtual.machine(tree(files))
     assert (said.verdict, found in said.found) == (verdict, True)
     assert bool(said.change) == (verdict == "fair")
 
 
-def test_times_of_a_cpu(tree):
+def test_cpu_times_are_read(tree):
     t = tree({"proc/stat": STAT})
     assert virtual.times(t, 1) == Times(500, 32)
     assert virtual.times(t, None) == Times(1000, 35)
     assert virtual.times(t, 2) is None
 
 
-def test_hidden_times(tree):
+def test_unreadable_cpu_times_are_none(tree):
     assert virtual.times(tree(), 0) is None
 
 
@@ -50,11 +50,11 @@ def test_hidden_times(tree):
         (Times(1, 1), None, "unknown"),
     ],
 )
-def test_steal(before, after, verdict):
+def test_steal_time_finding(before, after, verdict):
     said = virtual.steal(before, after, "during the measurement")
     assert said.verdict == verdict
     assert bool(said.change) == (verdict in ("fair", "bad"))
 
 
-def test_how_much_was_stolen():
+def test_share_of_steal_time():
     assert virtual.steal(Times(0, 0), Times(1000, 25), "since boot").found == "2.5 % since boot"

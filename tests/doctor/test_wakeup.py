@@ -10,7 +10,7 @@ CPU = max(os.sched_getaffinity(0))
 
 
 @pytest.mark.realtime
-def test_every_tick_that_was_due_is_counted():
+def test_every_due_tick_is_counted_or_skipped():
     with Sleeper(CPU, 80) as sleeper:
         assert all(isinstance(lack, str) for lack in sleeper.lacks)
         for period in (10_000_000, 5_000_000):
@@ -21,20 +21,20 @@ def test_every_tick_that_was_due_is_counted():
     assert sleeper._process.poll() is not None
 
 
-def test_this_process_stays_as_it_was():
+def test_scheduling_of_this_process_is_unchanged():
     before = os.sched_getscheduler(0), os.sched_getaffinity(0)
     with Sleeper(CPU, 80):
         assert (os.sched_getscheduler(0), os.sched_getaffinity(0)) == before
 
 
-def test_a_process_that_ends_says_why():
+def test_ended_measurement_process_reports_its_error():
     with pytest.raises(RuntimeError, match=r"the empty loop ended: .*sideways"), Sleeper("sideways", 80):  # type: ignore[arg-type]
         pass
 
 
-def test_lateness_is_told_by_the_clock(monkeypatch):
-    """The loop uncompiled, on a clock of our own: it wakes 10, 60 and 330 ns after it should."""
-    times = iter([0, 110, 260, 630, 700])  # start, and what the clock reads after each sleep
+def test_lateness_is_measured_by_the_clock(monkeypatch):
+    """The uncompiled loop on a stubbed clock: lateness 10, 60 and 330 ns."""
+    times = iter([0, 110, 260, 630, 700])  # start, then the clock after each sleep
     slept: list[int] = []
     monkeypatch.setattr(wakeup.clock, "now", lambda: next(times))
     monkeypatch.setattr(wakeup.clock, "sleep_until", slept.append)

@@ -25,7 +25,7 @@ WIRING = Wiring(
 
 @pytest.fixture(scope="session")
 def comedi_library(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A library with libcomedi's C signatures and a card behind them."""
+    """A library with the C signatures of libcomedi and an emulated card."""
     compiler = shutil.which("cc")
     if compiler is None:
         pytest.skip("no C compiler (cc) here")
@@ -37,7 +37,7 @@ def comedi_library(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def serial_library(tmp_path_factory: pytest.TempPathFactory) -> Any:
-    """The C of examples/serial_board/."""
+    """The compiled C code of examples/serial_board/."""
     import serial_device
 
     return serial_device.library(tmp_path_factory.mktemp("serial"))
@@ -45,7 +45,7 @@ def serial_library(tmp_path_factory: pytest.TempPathFactory) -> Any:
 
 @pytest.fixture
 def rig(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
-    """`rig("comedi", wiring)`: a card of a kind, not open yet, with its wires."""
+    """`rig("comedi", wiring)`: an unopened card with its wires."""
     import rigs
 
     made = []

@@ -13,11 +13,11 @@ from types import SimpleNamespace
 
 FRAME = struct.Struct("<IB3x8s")
 RTR = 0x40000000
-BEAT = 0.02  # s; ODrive's own is 0.1 s
+BEAT = 0.02  # s; default of ODrive: 0.1 s
 
 
 class Nodes:
-    """Nodes by id; `nodes[1].torque` is what it was last told, `nodes[1].position` what it will say, in turns."""
+    """Nodes by id: `nodes[1].torque` is the last received torque, `nodes[1].position` the reported position, turns."""
 
     def __init__(self, bus: socket.socket, *ids: int) -> None:
         self.bus, self.lock, self.running = bus, threading.RLock(), True
@@ -58,7 +58,7 @@ class Nodes:
                 self.move(now)
 
     def move(self, now: float) -> None:
-        """Nothing moves here; a test may say otherwise."""
+        """No motion by default; overridden by tests."""
 
     def heartbeat(self, n: int) -> None:
         node = self.nodes[n]
@@ -66,7 +66,7 @@ class Nodes:
             self._put(n << 5 | 0x01, struct.pack("<IBBBx", node.error, node.state, 0, 0))
 
     def pump(self) -> None:
-        """Take what has come, and answer it."""
+        """Process received frames and answer them."""
         with self.lock:
             while True:
                 try:
@@ -113,7 +113,7 @@ class Nodes:
             self._put(n << 5 | command, data)
 
     def send(self, n: int, command: int, data: bytes) -> None:
-        """A message that nobody has asked for."""
+        """Send an unsolicited message."""
         with self.lock:
             self._put(n << 5 | command, data)
 
@@ -123,7 +123,7 @@ class Nodes:
 
 
 def pair(interface: str = "vcan0") -> tuple[socket.socket, socket.socket]:
-    """Both ends of a bus: of a virtual CAN where there is one, else two packet sockets."""
+    """Both ends of a bus: a virtual CAN if available, otherwise two packet sockets."""
     try:
         ends = [socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW) for _ in range(2)]
         for end in ends:

@@ -1,4 +1,4 @@
-"""The kinds of board on a rig: the same wires, whoever drives them."""
+"""Rigs: each kind of board with the same emulated wires."""
 
 import ctypes
 from collections.abc import Callable
@@ -12,16 +12,16 @@ from rtctl.drivers.nidaq import NidaqError
 
 
 class Rig(NamedTuple):
-    """A card that is not open yet, and its wires."""
+    """An unopened card and its wires."""
 
     card: Board
     set_input: Callable[[int, float], None]  # channel, V
     pulse: Callable[[int, int], None]  # counter, signed pulses
     output: Callable[[int], float]  # V at a channel
     line: Callable[[int], int]
-    fail: Callable[[str], None]  # "inputs", "counters", "outputs" or "lines" do not work from now on
-    step: float  # V, what the card's inputs resolve
-    end: Callable[[], None] = lambda: None  # of what stands at the other end
+    fail: Callable[[str], None]  # makes "inputs", "counters", "outputs" or "lines" fail
+    step: float  # V, resolution of the inputs
+    end: Callable[[], None] = lambda: None  # closes the emulated device
 
 
 def emulated(wiring: Wiring) -> Rig:
@@ -103,11 +103,11 @@ def can(wiring: Wiring, **settings: Any) -> Rig:
     given = {
         "nodes": {name: {"id": node} for name, node in zip(wiring.drives, ids, strict=True)},
         "sensors": {name: {"id": node} for name, node in zip(wiring.sensors, of, strict=True)},
-        "timeout": 0.5,  # a busy machine's
+        "timeout": 0.5,  # s, for a busy machine
         **settings,
     }
     nodes = Nodes(theirs, *sorted({*ids, *of}))
-    card = CanBoard(CanSettings.model_validate(given), wiring, 2.0, ours)  # patient: an answer may take 0.25 s
+    card = CanBoard(CanSettings.model_validate(given), wiring, 2.0, ours)  # an answer may take 0.25 s
 
     def pulse(counter: int, pulses: int) -> None:
         nodes.nodes[of[counter]].position += pulses / 8192

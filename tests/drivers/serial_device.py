@@ -1,4 +1,4 @@
-"""A device at the other end of a pseudo-terminal, which runs the C of examples/serial_board/."""
+"""A device at the far end of a pseudo-terminal; runs the C code of examples/serial_board/."""
 
 import contextlib
 import ctypes
@@ -26,7 +26,7 @@ unsigned size(void) { return sizeof(rtctl_board); }
 
 
 class Board(ctypes.Structure):
-    """rtctl_board, as far as a program sees it."""
+    """Public fields of the C struct rtctl_board."""
 
     _fields_ = [
         ("output", ctypes.c_float * 16), ("on", ctypes.c_uint8), ("lines_out", ctypes.c_uint8),
@@ -37,7 +37,7 @@ class Board(ctypes.Structure):
 
 
 def library(folder: Path):
-    """The C of the example as a library; warnings are errors."""
+    """The C code of the example as a library; warnings are errors."""
     compiler = shutil.which("cc")
     if compiler is None:
         pytest.skip("no C compiler (cc) here")
@@ -49,7 +49,7 @@ def library(folder: Path):
 
 
 class Device:
-    """`port` is the device file; what a motor and an encoder would do is in `board`."""
+    """`port` is the device file; `board` holds outputs and counters for an emulated motor and encoder."""
 
     def __init__(self, lib, outputs=1, inputs=0, counters=1, lines=0, name=b"device") -> None:
         assert ctypes.sizeof(Board) >= lib.size()
@@ -81,7 +81,7 @@ class Device:
                 self.move(time.monotonic())
 
     def move(self, now: float) -> None:
-        """Nothing moves here; a test may say otherwise."""
+        """No motion by default; overridden by tests."""
 
     def pump(self) -> None:
         with self.lock:
@@ -103,7 +103,7 @@ class Device:
             os.write(self.master, reply)
 
     def told(self, number: int) -> Board:
-        """What the device was told, once it has read the outputs of this number."""
+        """Received outputs, after the device has read the outputs of this number."""
         end = time.monotonic() + 5
         while self.running and self.board.reply[3] != number and time.monotonic() < end:
             self.pump()

@@ -33,18 +33,18 @@ OUTPUTS = [
 ]
 
 
-def test_one_code_is_the_reference_over_2048_or_4096():
+def test_output_step_is_the_reference_over_2048_or_4096():
     assert OUTPUTS[0].volts_per_code == pytest.approx(4.8828125e-3)
     assert OUTPUTS[1].volts_per_code == pytest.approx(2.44140625e-3)
     assert mio.volts_to_codes(OUTPUTS[0], 99.0) == 2047
     assert mio.volts_to_codes(OUTPUTS[0], -math.inf) == -2048
     assert mio.volts_to_codes(OUTPUTS[1], -1.0) == 0
-    assert mio.volts_to_codes(OUTPUTS[2], 99.0) == -2048  # a negative reference turns the range over
+    assert mio.volts_to_codes(OUTPUTS[2], 99.0) == -2048  # a negative reference inverts the range
 
 
 @settings(deadline=None)
 @given(finite, st.sampled_from(OUTPUTS))
-def test_an_output_is_within_half_a_code_of_what_was_asked_or_at_its_end(volts, p):
+def test_output_is_within_half_a_code_of_the_command_or_at_its_limit(volts, p):
     codes = mio.volts_to_codes(p, volts)
     back = mio.codes_to_volts(p, codes)
     ends = sorted((p.code_min * p.volts_per_code, p.code_max * p.volts_per_code))
@@ -55,16 +55,16 @@ def test_an_output_is_within_half_a_code_of_what_was_asked_or_at_its_end(volts, 
 
 @settings(deadline=None)
 @given(st.integers(-2048, 2047))
-def test_codes_survive_the_way_to_volts_and_back(codes):
+def test_codes_survive_a_round_trip_through_volts(codes):
     assert mio.volts_to_codes(OUTPUTS[0], mio.codes_to_volts(OUTPUTS[0], codes)) == codes
 
 
-def test_what_is_not_a_number_is_zero_volts():
+def test_nan_command_is_zero_volts():
     assert mio.volts_to_codes(OUTPUTS[0], math.nan) == 0
     assert mio.input_step(analog_input(), record(mio.ANALOG_INPUT_STATE), math.nan) == 0
 
 
-def test_a_new_code_acts_after_its_write_and_settles_in_3_us():
+def test_new_code_acts_after_its_write_and_settles_in_3_us():
     p, s, h = OUTPUTS[0], record(mio.ANALOG_OUTPUT_STATE), 100e-6
     late = (1e-6 + 1.5e-6) / h  # the write, and half of the linear rise
     assert mio.output_step(p, s, 1024, h) == pytest.approx(5.0 * (1 - late))
@@ -74,7 +74,7 @@ def test_a_new_code_acts_after_its_write_and_settles_in_3_us():
     assert [mio.output_step(p, s, 1024, step) for step in (1e-6, 1.5e-6, 1.5e-6)] == pytest.approx([0, 1.25, 3.75])
 
 
-def test_the_second_output_is_written_one_microsecond_later():
+def test_second_output_is_written_one_microsecond_later():
     first, second = (mio.output_step(output(channel=c), record(mio.ANALOG_OUTPUT_STATE), 2000, 1e-4) for c in (0, 1))
     assert (first - second) * 1e-4 == pytest.approx(2000 * 10 / 2048 * 1e-6)
     alone = mio.build_output(mio.AnalogOutputSettings(channel=1), DT, write_order=0)
@@ -83,7 +83,7 @@ def test_the_second_output_is_written_one_microsecond_later():
 
 @settings(deadline=None)
 @given(st.integers(1, 400), st.integers(-2048, 2047), st.integers(-2048, 2047))
-def test_the_mean_does_not_depend_on_how_the_time_is_cut(pieces, before, after):
+def test_mean_output_does_not_depend_on_the_step_size(pieces, before, after):
     p, h = OUTPUTS[0], 20e-6
     whole, cut = record(mio.ANALOG_OUTPUT_STATE), record(mio.ANALOG_OUTPUT_STATE)
     for s in (whole, cut):
@@ -103,13 +103,13 @@ INPUTS = [
 
 @settings(deadline=None)
 @given(finite, st.sampled_from(INPUTS))
-def test_an_input_is_within_half_a_code_of_its_voltage_or_at_its_end(volts, p):
+def test_input_is_within_half_a_code_of_its_voltage_or_at_its_limit(volts, p):
     codes = mio.input_step(p, record(mio.ANALOG_INPUT_STATE), volts)
     wanted = min(max(volts, p.code_min * p.volts_per_code), p.code_max * p.volts_per_code)
     assert abs(mio.codes_to_input_volts(p, codes) - wanted) <= 0.5 * p.volts_per_code * (1 + 1e-9)
 
 
-def test_input_ranges():
+def test_input_ranges_of_gain_and_polarity():
     for keys, low, high in [
         ({}, -5, 5), ({"gain": 0.5}, -10, 10), ({"gain": 100}, -0.05, 0.05), ({"polarity": "unipolar"}, 0, 10),
     ]:  # fmt: skip
@@ -124,7 +124,7 @@ def codes_of(p, volts, n=20_000):
     return np.array([mio.input_step(p, s, volts) for _ in range(n)])
 
 
-def test_dither_makes_the_mean_finer_than_a_code():
+def test_dither_resolves_the_mean_below_a_code():
     p = analog_input(dither=True, seed=7)
     assert np.mean(codes_of(p, 0.3 * p.volts_per_code)) == pytest.approx(0.3, abs=0.03)
     plain = analog_input()
@@ -134,7 +134,7 @@ def test_dither_makes_the_mean_finer_than_a_code():
 def test_dither_is_half_a_code_rms_and_repeats_with_its_seed():
     p = analog_input(dither=True, seed=7)
     x = codes_of(p, 0.0)
-    assert np.std(x) == pytest.approx(math.sqrt(0.25 + 1 / 12), rel=0.02)  # with the quantisation
+    assert np.std(x) == pytest.approx(math.sqrt(0.25 + 1 / 12), rel=0.02)  # dither plus quantisation
     assert np.corrcoef(x[1:], x[:-1])[0, 1] == pytest.approx(0, abs=0.03)
     assert (x[:500] == codes_of(p, 0.0, 500)).all()
     assert (x[:500] != codes_of(analog_input(dither=True, seed=8), 0.0, 500)).any()
@@ -151,7 +151,7 @@ def test_dither_is_half_a_code_rms_and_repeats_with_its_seed():
         ({"mode": "floating"}, "differential"),
     ],
 )
-def test_refuses_an_input_that_the_board_has_not(keys, words):
+def test_invalid_input_is_refused(keys, words):
     with pytest.raises(ValidationError, match=words):
         mio.AnalogInputSettings(**{"channel": 0, **keys})
 
@@ -166,7 +166,7 @@ def test_refuses_an_input_that_the_board_has_not(keys, words):
         ({"channel": 2}, "0 or 1"),
     ],
 )
-def test_refuses_an_output_that_the_board_has_not(keys, words):
+def test_invalid_output_is_refused(keys, words):
     with pytest.raises(ValidationError, match=words):
         mio.AnalogOutputSettings(**{"channel": 0, **keys})
 
@@ -175,7 +175,7 @@ def scan(*items):
     return [mio.AnalogInputSettings(channel=c, mode=m) for c, m in items]
 
 
-def test_a_scan_is_ascending_and_uses_no_input_twice():
+def test_scan_order_is_ascending_without_duplicates():
     mio.check_inputs(scan((0, "differential"), (1, "differential"), (2, "rse"), (10, "nrse")))
     with pytest.raises(ValueError, match="differential input 1 uses input 9 too"):
         mio.check_inputs(scan((1, "differential"), (9, "rse")))
@@ -186,7 +186,7 @@ def test_a_scan_is_ascending_and_uses_no_input_twice():
         mio.check_channels("analog outputs", [0, 2], 1)
 
 
-def test_refuses_a_period_that_ends_before_the_board_is_done():
+def test_period_shorter_than_the_scan_is_refused():
     with pytest.raises(ValueError, match="output 1 settles in 5 us"):
         mio.build_output(mio.AnalogOutputSettings(channel=1), 4e-6)
     with pytest.raises(ValueError, match="too short for 3 inputs"):
@@ -194,7 +194,7 @@ def test_refuses_a_period_that_ends_before_the_board_is_done():
 
 
 @pytest.mark.parametrize(("polarity", "ends"), [("bipolar", (-32768, 32767)), ("unipolar", (0, 65535))])
-def test_converters_of_other_cards_have_other_bits(polarity, ends):
+def test_converter_resolution_is_a_setting(polarity, ends):
     for made, span in ((output(polarity=polarity, bits=16), 20 if polarity == "bipolar" else 10),
                        (analog_input(polarity=polarity, bits=16), 10)):  # fmt: skip
         assert (made.code_min, made.code_max) == ends

@@ -1,4 +1,4 @@
-"""What every card has to do, emulated or real: one suite over all of them."""
+"""Common requirements of every card, emulated or real."""
 
 import numpy as np
 import pytest
@@ -22,26 +22,26 @@ def frame():
 
 @pytest.fixture(params=KINDS)
 def wired(request, rig):
-    """An open card with its wires, of each kind in turn."""
+    """An open card of each kind, with its wires."""
     made = rig(request.param)
     made.card.open()
     return made
 
 
-def test_outputs_are_zero_from_the_start(wired):
+def test_outputs_are_zero_at_the_start(wired):
     assert [wired.output(c) for c in (0, 1)] == pytest.approx([0.0, 0.0], abs=1e-3)
     assert wired.line(2) == 0
 
 
 @pytest.mark.parametrize("codes", [(1, -1), (2047, -2048), (-2048, 2047), (0, 1000)])
-def test_a_code_is_so_many_volts(wired, codes):
+def test_code_gives_its_voltage(wired, codes):
     wired.card.write(codes, 0)
     assert [wired.output(c) for c in (0, 1)] == pytest.approx([c * OUT_STEP for c in codes], abs=4e-4)
 
 
 @settings(deadline=None, max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(codes=st.tuples(CODES, CODES), lines=st.integers(0, 255))
-def test_any_code_is_within_a_step_of_its_volts_and_only_our_line_moves(wired, codes, lines):
+def test_every_code_is_within_a_step_of_its_voltage_and_sets_only_its_line(wired, codes, lines):
     others = [wired.line(n) for n in range(8) if n != 2]
     wired.card.write(codes, lines)
     assert [wired.output(c) for c in (0, 1)] == pytest.approx([c * OUT_STEP for c in codes], abs=4e-4)
@@ -51,7 +51,7 @@ def test_any_code_is_within_a_step_of_its_volts_and_only_our_line_moves(wired, c
 
 @settings(deadline=None, max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(unipolar=st.floats(-1, 12), bipolar=st.floats(-7, 7))
-def test_any_voltage_becomes_the_nearest_code_of_its_range(wired, frame, unipolar, bipolar):
+def test_input_voltage_becomes_the_nearest_code(wired, frame, unipolar, bipolar):
     wired.set_input(0, unipolar)
     wired.set_input(1, bipolar)
     wired.card.read(frame)
@@ -61,7 +61,7 @@ def test_any_voltage_becomes_the_nearest_code_of_its_range(wired, frame, unipola
     assert not frame["ai_codes"][2:].any()
 
 
-def test_counters_begin_in_the_middle_and_count_both_ways(wired, frame):
+def test_counters_start_at_mid_range_and_count_in_both_directions(wired, frame):
     wired.pulse(0, 100)
     wired.pulse(1, -7)
     wired.card.read(frame)
@@ -71,7 +71,7 @@ def test_counters_begin_in_the_middle_and_count_both_ways(wired, frame):
     assert frame["counter_codes"][0] == daq_stc.INITIAL_COUNT - 200
 
 
-def test_a_count_beyond_24_bits_wraps_as_the_reader_expects(wired, frame):
+def test_counter_wraps_at_24_bits(wired, frame):
     s = np.zeros(1, daq_stc.READER_STATE)[0]
     total = 0
     for step in (5_000_000, 5_000_000, 5_000_000, -6_000_000, -6_000_000, -6_000_000):
@@ -85,7 +85,7 @@ def test_a_count_beyond_24_bits_wraps_as_the_reader_expects(wired, frame):
     ("what", "words"),
     [("inputs", "input|Scan|pulled|present|currents|fault 7"), ("counters", "counter|pulled|driver fault|fault 7")],
 )
-def test_a_failed_read_takes_the_outputs_to_zero_and_says_where(wired, frame, what, words):
+def test_failed_read_zeroes_the_outputs_and_names_the_channel(wired, frame, what, words):
     wired.card.write((500, -500), 0xFF)
     wired.fail(what)
     with pytest.raises(BoardError, match=words) as error:
@@ -96,7 +96,7 @@ def test_a_failed_read_takes_the_outputs_to_zero_and_says_where(wired, frame, wh
     assert wired.card.failed is error.value
 
 
-def test_one_output_that_fails_does_not_leave_the_other_on(wired):
+def test_failure_of_one_output_zeroes_the_other(wired):
     wired.card.write((500, -500), 0)
     wired.fail("outputs")
     with pytest.raises(BoardError, match=r"output|present|pulled|could not be sent"):
@@ -104,14 +104,14 @@ def test_one_output_that_fails_does_not_leave_the_other_on(wired):
 
 
 @pytest.mark.parametrize("codes", [(2048, 0), (0, -2049), (1 << 20, 0)])
-def test_a_code_that_does_not_exist_is_never_written(wired, codes):
+def test_code_out_of_range_is_never_written(wired, codes):
     wired.card.write((500, -500), 0)
     with pytest.raises(BoardError, match="-2048 to 2047"):
         wired.card.write(codes, 0)
     assert [wired.output(c) for c in (0, 1)] == pytest.approx([0.0, 0.0], abs=1e-3)
 
 
-def test_closing_leaves_zero_behind_and_may_be_done_twice(wired, frame):
+def test_close_zeroes_the_outputs_and_can_be_repeated(wired, frame):
     wired.card.write((500, -500), 0xFF)
     wired.card.close()
     wired.card.close()
@@ -123,7 +123,7 @@ def test_closing_leaves_zero_behind_and_may_be_done_twice(wired, frame):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_machine_without_inputs_or_lines_reads_its_counter_alone(rig, kind, frame):
+def test_machine_without_inputs_and_lines_reads_its_counter(rig, kind, frame):
     made = rig(kind, Wiring((AnalogOutputSettings(channel=1, polarity="unipolar"),), counters=1))
     made.card.open()
     made.card.write((4095,), 0xFF)
@@ -135,7 +135,7 @@ def test_a_machine_without_inputs_or_lines_reads_its_counter_alone(rig, kind, fr
 
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "comedi"])  # that card has 12 bits
 @pytest.mark.parametrize("code", [12345, -32768, 32767, 1])
-def test_a_converter_of_sixteen_bits(rig, kind, frame, code):
+def test_sixteen_bit_converter(rig, kind, frame, code):
     output = AnalogOutputSettings(channel=0, bits=16)
     made = rig(kind, Wiring((output,), (AnalogInputSettings(channel=0, bits=16),), counters=1))
     made.card.open()

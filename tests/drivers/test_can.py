@@ -1,4 +1,4 @@
-"""CANSimple nodes as a board: what they are told, what they say, and what a bad one is told of."""
+"""CANSimple nodes as a board: commands, measurements, and faults of a node."""
 
 import contextlib
 import struct
@@ -42,7 +42,7 @@ def bench():
         prepare(nodes.nodes[5])
         made.append((nodes, ours))
         with nodes.lock, contextlib.suppress(BlockingIOError):
-            while ours.recv(16):  # heartbeats of before
+            while ours.recv(16):  # discard queued heartbeats
                 pass
         card = CanBoard(CanSettings.model_validate({"timeout": 0.5, **given, **settings}), DESCRIBED, rate, ours)
         return (card.open() if opened else card), nodes
@@ -54,7 +54,7 @@ def bench():
 
 
 def until_it_fails(card, frame, seconds=5.0):
-    """Turns of the board until one fails."""
+    """Run turns of the board until one fails."""
     end = time.monotonic() + seconds
     while time.monotonic() < end:
         card.write((100,), 0)
@@ -62,8 +62,8 @@ def until_it_fails(card, frame, seconds=5.0):
     pytest.fail(f"nothing failed in {seconds} s")
 
 
-def test_units_of_a_described_machine(bench, frame):
-    """0.5 Nm of the node a unit, counts of 8192 a turn from where it stood, rad/s of the tacho."""
+def test_can_units_of_a_described_machine(bench, frame):
+    """0.5 Nm per unit of command, 8192 counts per turn from the start position, rad/s of the tachometer."""
     card, nodes = bench(prepare=lambda node: setattr(node, "position", 3.25))
     card.write((HALF // 2,), 0)
     assert nodes[5].torque == pytest.approx(0.5 * 1.0)
@@ -73,7 +73,7 @@ def test_units_of_a_described_machine(bench, frame):
     assert frame["ai_codes"][0] == round(-1.5 * 2 * np.pi / 1e-3)
 
 
-def test_it_is_switched_on_with_the_machine_in_torque_mode_and_off_again(bench):
+def test_node_is_in_torque_mode_only_while_the_machine_is_on(bench):
     card, nodes = bench()
     assert (nodes[5].state, nodes[5].mode, nodes.cleared) == (1, (1, 1), 1)
     card.enable(True)
@@ -82,14 +82,14 @@ def test_it_is_switched_on_with_the_machine_in_torque_mode_and_off_again(bench):
     assert nodes[5].state == 1
 
 
-def test_velocity_mode(bench):
+def test_node_in_velocity_mode(bench):
     given = {**GIVEN, "nodes": {"motor": {"id": 5, "input": "velocity", "scale": -2.0}}}
     card, nodes = bench(given=given)
     card.write((HALF // 2,), 0)
     assert (nodes[5].mode, nodes[5].speed_input, nodes[5].torque) == ((2, 1), -2.0, 0.0)
 
 
-def test_nodes_that_send_by_themselves(bench, frame):
+def test_nodes_with_cyclic_messages_are_read(bench, frame):
     def sends(node):
         node.silent.add(0x14)
 
@@ -149,7 +149,7 @@ def not_a_number(node):
         (not_a_number, {}, r"node 5 sent encoder estimates \(0x0A9\) of 8 bytes, not valid in CANSimple"),
     ],
 )
-def test_a_bad_node_ends_it_with_its_input_at_zero(bench, frame, spoil, settings, words):
+def test_faulty_node_ends_the_board_with_zero_input(bench, frame, spoil, settings, words):
     card, nodes = bench(**settings)
     card.enable(True)
     card.write((1000,), 0)
@@ -161,14 +161,14 @@ def test_a_bad_node_ends_it_with_its_input_at_zero(bench, frame, spoil, settings
     assert (nodes[5].torque, nodes[5].state) == (0.0, 1)
 
 
-def test_a_node_that_does_not_enter_closed_loop_control(bench, frame):
+def test_node_that_does_not_enter_closed_loop_control_is_an_error(bench, frame):
     card, _nodes = bench(prepare=lambda node: setattr(node, "stubborn", True))
     card.enable(True)
     with pytest.raises(BoardError, match=r"node 5 \(motor\) is not in closed loop control but idle; was it calibrated"):
         until_it_fails(card, frame)
 
 
-def test_frames_of_others_are_passed_over(bench, frame):
+def test_foreign_frames_are_ignored(bench, frame):
     card, nodes = bench()
     nodes.nodes[7] = nodes.nodes[5]
     nodes.send(7, 0x09, struct.pack("<f", 1.0))
@@ -187,13 +187,13 @@ def test_frames_of_others_are_passed_over(bench, frame):
         (silent, r"node 5 .* answers no request for encoder estimates within 1 s"),
     ],
 )
-def test_a_bad_node_is_refused_at_the_start(bench, spoil, words):
+def test_faulty_node_is_refused_at_the_start(bench, spoil, words):
     with pytest.raises(UserError, match=words):
         bench(prepare=spoil)
 
 
-def test_nodes_that_answer_late_from_the_start_are_refused(bench):
-    """Their samples come at the right rate, and each is old: nobody could tell later."""
+def test_node_with_late_answers_is_refused_at_the_start(bench):
+    """The samples arrive at the nominal rate with a constant delay, which cannot be detected later."""
     with pytest.raises(UserError, match=r"the nodes answer after \d+ ms, and driver.timeout is 300 ms"):
         bench(timeout=0.3, prepare=late)
 
@@ -206,13 +206,13 @@ def test_nodes_that_answer_late_from_the_start_are_refused(bench):
         ({"sensors": {"encoder": {"id": 5}}}, "driver.sensors.tacho is missing"),
     ],
 )
-def test_drives_and_sensors_are_those_of_the_machine(given, words):
+def test_node_map_must_match_the_drives_and_sensors_of_the_machine(given, words):
     with pytest.raises(UserError, match=words):
         CanBoard(CanSettings.model_validate({**GIVEN, **given}), DESCRIBED, 200.0)
 
 
-def test_an_input_is_zeroed_even_where_its_node_is_refused(bench):
-    """As after the death of a board's process: a node that is silent may still hear."""
+def test_input_of_a_refused_node_is_zeroed(bench):
+    """As after the death of a board process: a silent node may still receive."""
     seen = []
 
     def runs_away(node):
@@ -225,7 +225,7 @@ def test_an_input_is_zeroed_even_where_its_node_is_refused(bench):
     assert (seen[0].torque, seen[0].state) == (0.0, 1)
 
 
-def test_an_error_that_is_cleared_is_no_refusal(bench):
+def test_cleared_node_error_is_accepted(bench):
     card, nodes = bench(opened=False, prepare=faulty)
     take = nodes._take
 
@@ -239,7 +239,7 @@ def test_an_error_that_is_cleared_is_no_refusal(bench):
     assert nodes.cleared == 1
 
 
-def test_what_the_bus_cannot_do_for_a_machine():
+def test_machine_that_the_bus_cannot_serve_is_refused():
     output = AnalogOutputSettings(channel=0)
     with pytest.raises(UserError, match=r"has no digital lines, and this machine writes 2; use driver.kind serial"):
         CanBoard(CanSettings.model_validate(GIVEN), Wiring((output,), lines=(2,), drives=("motor",)), 200.0)
@@ -252,7 +252,7 @@ def test_what_the_bus_cannot_do_for_a_machine():
         CanBoard(CanSettings.model_validate({**GIVEN, "nodes": {"motor": {"id": 5}, "other": {"id": 5}}}), two, 200.0)
 
 
-def test_an_interface_that_does_not_open():
+def test_unavailable_can_interface_is_an_error():
     with pytest.raises(UserError, match=r"driver.interface: (there is no nocan7|this kernel has no CAN)"):
         connect("nocan7")
     with pytest.raises(UserError, match=r"driver.interface: nothing listens at /nowhere"):

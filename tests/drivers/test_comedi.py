@@ -32,7 +32,7 @@ def wires(comedi_library):
         ("/dev/comedi5", "busy"),
     ],
 )
-def test_a_device_file_that_does_not_open_says_what_to_do(comedi_library, device, words):
+def test_unopenable_device_file_error_names_the_remedy(comedi_library, device, words):
     with pytest.raises(UserError, match=words):
         card(comedi_library, device=device).open()
 
@@ -57,7 +57,7 @@ def test_a_device_file_that_does_not_open_says_what_to_do(comedi_library, device
         ),
     ],
 )
-def test_a_card_that_lacks_something_is_refused_by_name(wires, comedi_library, wiring, settings, words):
+def test_card_that_lacks_a_function_is_refused_by_name(wires, comedi_library, wiring, settings, words):
     made = card(comedi_library, wiring, **settings)
     if words is None:
         made.open().close()
@@ -68,7 +68,7 @@ def test_a_card_that_lacks_something_is_refused_by_name(wires, comedi_library, w
     assert wires.wire_open(0) == wires.wire_open(1) == 0
 
 
-def test_outputs_of_another_program_are_not_touched(wires, comedi_library):
+def test_outputs_locked_by_another_program_are_not_changed(wires, comedi_library):
     wires.wire_lock(0)
     before = wires.wire_raw(0, 0)
     with pytest.raises(UserError, match="belong to another program"):
@@ -76,7 +76,7 @@ def test_outputs_of_another_program_are_not_touched(wires, comedi_library):
     assert wires.wire_raw(0, 0) == before
 
 
-def test_an_external_reference_scales_the_output(wires, comedi_library):
+def test_external_reference_scales_the_output(wires, comedi_library):
     made = card(comedi_library, Wiring((AnalogOutputSettings(channel=1, reference="external", external_volts=4.0),)))
     made.open()
     made.write((1024,), 0)
@@ -84,7 +84,7 @@ def test_an_external_reference_scales_the_output(wires, comedi_library):
     made.close()
 
 
-def test_one_output_that_fails_does_not_leave_the_other_on(wires, comedi_library):
+def test_failure_of_one_output_zeroes_the_other(wires, comedi_library):
     made = card(comedi_library, Wiring((AnalogOutputSettings(channel=0), AnalogOutputSettings(channel=1)))).open()
     made.write((500, 500), 0)
     wires.wire_fail(2, 0)
@@ -94,28 +94,28 @@ def test_one_output_that_fails_does_not_leave_the_other_on(wires, comedi_library
     made.close()
 
 
-def test_a_card_that_is_pulled_out_while_it_runs_is_an_error_with_its_name(wires, comedi_library):
+def test_card_removed_during_a_run_is_an_error_with_its_name(wires, comedi_library):
     made = card(comedi_library).open()
     wires.wire_break_open(0)
     with pytest.raises(BoardError, match=r"/dev/comedi0 \(at-mio-16de-10\): writing output 0: Bad file"):
         made.write((1,), 0)
 
 
-def test_counting_lines_are_inputs_and_ours_are_outputs(wires, comedi_library):
+def test_counter_lines_are_inputs_and_machine_lines_are_outputs(wires, comedi_library):
     made = card(comedi_library, Wiring((AnalogOutputSettings(channel=0),), counters=2, lines=(3,))).open()
     assert wires.wire_outputs(0) == 1 << 3
     made.close()
 
 
-def test_a_missing_library_is_named(tmp_path):
+def test_missing_comedi_library_is_named(tmp_path):
     with pytest.raises(UserError, match=r"driver.library: .*nothing.so is no libcomedi"):
         card(tmp_path / "nothing.so").open()
 
 
-def test_a_library_that_is_none_of_comedis_is_refused():
+def test_library_other_than_comedi_is_refused():
     with pytest.raises(UserError, match=r"is no libcomedi 0\.11"):
         card("libm.so.6").open()
 
 
-def test_pins_are_numbered_as_in_comedi_h():
+def test_pin_numbers_are_those_of_comedi_h():
     assert [pfi_other(n) for n in (0, 9, 10, 11)] == [1, 10, 0x15, 0x16]

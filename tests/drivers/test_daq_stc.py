@@ -20,7 +20,7 @@ def count(s, step):
 
 @settings(deadline=None)
 @given(steps)
-def test_position_is_the_sum_of_all_steps_through_any_number_of_wraps(path):
+def test_position_is_the_sum_of_all_steps_across_wraps(path):
     counter, reader = new()
     total = 0
     for step in path:
@@ -30,7 +30,7 @@ def test_position_is_the_sum_of_all_steps_through_any_number_of_wraps(path):
         assert daq_stc.counter_position(reader, codes) == total
 
 
-def test_wraps_at_both_ends():
+def test_counter_wraps_at_both_ends():
     counter, _ = new()
     assert count(counter, 0) == 8388608
     assert count(counter, HALF - 1) == (1 << 24) - 1
@@ -38,6 +38,6 @@ def test_wraps_at_both_ends():
     assert count(counter, -1) == (1 << 24) - 1
 
 
-def test_the_first_reading_counts_from_the_initial_count():
+def test_first_reading_counts_from_the_initial_count():
     _, reader = new()
     assert daq_stc.counter_position(reader, 8388608 + 5) == 5

@@ -29,7 +29,7 @@ def run(p, path, h=H):
 
 @settings(deadline=None)
 @given(st.lists(angles, min_size=1, max_size=50))
-def test_x4_counts_the_difference_of_floors_for_any_path(path):
+def test_x4_counts_are_the_difference_of_floors_for_any_path(path):
     s, pulses = run(X4, path)
     floors = [math.floor(theta * X4.quarters_per_radian) for theta in path]
     assert s["lost"] == 0
@@ -48,7 +48,7 @@ def test_x1_stays_within_a_line_of_the_angle(path):
 
 
 def decode_x1(quarters):
-    """A plain decoder of the signals themselves: a pulse where A rises, up when B is low."""
+    """Reference decoder of the signals: one pulse per rising edge of A, up when B is low."""
     pulses = [0]
     for before, after in pairwise(quarters):
         rises = after % 4 in (0, 1) and before % 4 not in (0, 1)
@@ -56,7 +56,7 @@ def decode_x1(quarters):
     return pulses
 
 
-FORTH_AND_BACK = [*range(0, 30), *range(28, -32, -1), *range(-30, 9)]  # turns where A is high
+FORTH_AND_BACK = [*range(0, 30), *range(28, -32, -1), *range(-30, 9)]  # reversals while A is high
 
 
 @pytest.mark.parametrize("path", [range(0, 40), range(0, -40, -1), FORTH_AND_BACK])
@@ -67,7 +67,7 @@ def test_x1_counts_one_edge_of_a_with_the_direction_of_b(path):
 
 @settings(deadline=None)
 @given(st.integers(-50, 50), st.integers(1, 200), st.sampled_from((X4, X1)))
-def test_vibration_on_an_edge_does_not_add_up(edge, times, p):
+def test_vibration_on_an_edge_does_not_accumulate_counts(edge, times, p):
     path = [(edge - 0.4) * QUARTER, (edge + 0.4) * QUARTER] * times
     _, pulses = run(p, [*path, path[0]])
     assert abs(np.cumsum(pulses)).max() <= 1
@@ -86,7 +86,7 @@ def test_no_count_is_lost_up_to_the_highest_rate(share, start, sign, h):
 
 @settings(deadline=None)
 @given(st.floats(1.02, 20.0), st.sampled_from((-1, 1)))
-def test_above_the_highest_rate_the_count_falls_behind_by_what_is_lost(share, sign):
+def test_count_above_the_highest_rate_lags_by_the_lost_pulses(share, sign):
     step = sign * share * X4.highest_rate * H * QUARTER
     s, pulses = run(X4, [0.5 * QUARTER + k * step for k in range(300)])
     asked = abs(math.floor(0.5 + 299 * step / QUARTER))
@@ -101,7 +101,7 @@ def test_exactly_the_highest_rate_is_not_too_fast():
     assert (sum(pulses), s["lost"]) == (500, 0)
 
 
-def test_a_rest_does_not_save_up_room_for_a_burst():
+def test_rest_does_not_raise_the_highest_rate_of_a_burst():
     s, pulses = run(X4, [0.5 * QUARTER] * 100 + [1000.5 * QUARTER])
     assert (pulses[-1], s["lost"]) == (101, 899)  # a hundred in 0.1 ms and the one that was ready
 
@@ -117,7 +117,7 @@ def test_counts_per_turn_and_radians():
     assert ls7084.radians(X1, 2500) == pytest.approx(2 * math.pi)
 
 
-def test_the_first_call_takes_the_position_without_pulses():
+def test_first_call_takes_the_position_without_pulses():
     _, pulses = run(X4, [1.2345, 1.2345 + 3.01 * QUARTER])
     assert pulses[0] == 0 and pulses[1] == 3
     assert run(X4, [0.0, math.nan, 0.0])[1] == [0, 0, 0]

@@ -41,7 +41,7 @@ def board():
     return board
 
 
-def test_start_outputs_terminate(board):
+def test_example_of_appendix_d_runs(board):
     board.input_volts[:3] = [9.0, 0.5, 7.5]
     board.dio[6], board.dio[7] = 1, 0
     board.pulse(0, 100)
@@ -61,12 +61,12 @@ def test_start_outputs_terminate(board):
     assert [board.GPCTR_Watch(1, c, ni.ND_COUNT) for c in (ni.ND_COUNTER_0, ni.ND_COUNTER_1)] == [0, 0]
 
 
-def test_an_input_beyond_its_range_reads_the_end_of_it(board):
+def test_input_beyond_its_range_reads_the_range_limit(board):
     board.input_volts[:3] = [-99.0, 99.0, -1.0]
     assert board.AI_VRead_Scan(1) == pytest.approx([-10.0, 1.0 - 2 / 4096, 0.0])
 
 
-def test_an_external_reference_sets_the_range(board):
+def test_external_reference_sets_the_range(board):
     board.AO_Configure(1, 0, 1, 1, 4.096, 0)
     board.AO_VWrite(1, 0, 99.0)
     assert board.output_volts(0) == pytest.approx(4.095)
@@ -98,13 +98,13 @@ def test_an_external_reference_sets_the_range(board):
         ),
     ],
 )
-def test_refuses_with_the_code_of_ni_daq_and_a_reason(board, call, name, words):
+def test_refused_call_returns_the_ni_daq_code_and_a_reason(board, call, name, words):
     with pytest.raises(ni.NidaqError, match=words) as error:
         call(board)
     assert (error.value.name, error.value.code) == (name, ni.CODES[name])
 
 
-def test_refuses_calls_before_their_setup():
+def test_calls_before_their_setup_are_refused():
     board = ni.EmulatedBoard()
     for call in (
         lambda: board.AI_VRead_Scan(1),

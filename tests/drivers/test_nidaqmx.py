@@ -20,21 +20,21 @@ ONE = Wiring((AnalogOutputSettings(channel=0),))
         ),
     ],
 )
-def test_what_the_card_lacks_is_said(rig, wiring, settings, words):
+def test_missing_function_of_the_card_is_named(rig, wiring, settings, words):
     made = rig("nidaqmx", wiring, **settings)
     with pytest.raises(UserError, match=words):
         made.card.open()
     assert not made.card.is_open
 
 
-def test_no_card_at_all(rig, monkeypatch):
+def test_missing_card_is_an_error(rig, monkeypatch):
     made = rig("nidaqmx", ONE)
     nidaqmx.utils._select_interpreter().devices = []
     with pytest.raises(UserError, match="no card at all; see `nilsdev`"):
         made.card.open()
 
 
-def test_without_the_driver_of_national_instruments_it_says_so(rig, monkeypatch):
+def test_missing_ni_driver_is_an_error(rig, monkeypatch):
     made = rig("nidaqmx", ONE)
 
     def missing(*_):

@@ -17,7 +17,7 @@ def counts(path, p=P):
     return [sensor.count(p, s, sensor.volts(p, float(theta))) for theta in path]
 
 
-def test_209_periods_a_turn_half_of_each_light():
+def test_sensor_has_209_periods_per_turn_with_half_of_each_light():
     v = np.array([sensor.volts(P, theta) for theta in np.linspace(0, 2 * math.pi, 100_001)])
     assert v.min() == 0 and v.max() == 5
     assert np.mean(v > 2.5) == pytest.approx(0.5, abs=1e-3)
@@ -26,8 +26,8 @@ def test_209_periods_a_turn_half_of_each_light():
 
 @settings(deadline=None)
 @given(st.lists(st.integers(-30, 30), max_size=12), st.floats(0.05, 0.95))
-def test_counts_travel_whatever_its_direction(legs, phase):
-    """Legs of whole periods that turn in a dark stretch: every period of |travel| is one count."""
+def test_sensor_counts_travel_in_both_directions(legs, phase):
+    """Legs of full periods with reversals in a dark stretch: one count per period of |travel|."""
     p = sensor.build(sensor.OpticalSensorSettings(phase=phase), 0.002)
     at, path = -phase * PERIOD, []
     for leg in legs:
@@ -46,7 +46,7 @@ def test_noise_that_does_not_cross_both_levels_is_not_counted(light, dark):
 
 @settings(deadline=None, max_examples=30)
 @given(st.floats(0, 1), st.sampled_from((1, -1)))
-def test_counts_every_edge_at_the_highest_speed_but_not_at_twice_that(start, sign):
+def test_sensor_counts_every_edge_up_to_the_highest_speed(start, sign):
     dt, n = 0.002, 2000
     for times, misses in ((0.999, False), (2.3, True)):
         step = sign * times * sensor.highest_speed(SETTINGS, dt) * dt
@@ -54,16 +54,16 @@ def test_counts_every_edge_at_the_highest_speed_but_not_at_twice_that(start, sig
         assert (abs(last - n * abs(step) / PERIOD) > 2) == misses
 
 
-def test_the_first_sample_only_takes_the_level():
+def test_first_sample_sets_the_level_without_a_count():
     light = PERIOD / 2
     assert counts([light, light, 0.0, light]) == [0, 0, 0, 1]
     assert sensor.radians(P, 209) == pytest.approx(2 * math.pi)
 
 
-def test_highest_speed_in_the_docstring():
+def test_highest_speed_agrees_with_the_docstring():
     assert sensor.highest_speed(SETTINGS, 0.002) == pytest.approx(7.2, abs=0.05)
 
 
-def test_refuses_crossed_levels():
+def test_crossed_levels_are_refused():
     with pytest.raises(ValueError, match="must lie below"):
         sensor.build(sensor.OpticalSensorSettings(low=3.0, high=2.0), 0.002)

@@ -1,4 +1,4 @@
-"""Numbers of a measuring device: the nearest step, noise of the size given, and what is out of reach."""
+"""Numeric readout of a sensor: rounding to a step, noise amplitude, and range."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ def codes(p, values):
     return np.array([readout.codes.interpret(p, s, y) for y in values])
 
 
-def test_a_number_is_the_nearest_step():
+def test_readout_is_rounded_to_the_nearest_step():
     p = readout.build(scale=1000.0, grain=0.5, noise=0.0, seed=1)  # mm in steps of 0.5 mm
     found = codes(p, [0.0, 0.0007, -0.0103])
     assert found.tolist() == [0, 1, -21]
@@ -19,7 +19,7 @@ def test_a_number_is_the_nearest_step():
     assert [readout.code.interpret(p, v) for v in (0.5, -10.5)] == [1, -21]
 
 
-def test_noise_has_its_size_and_repeats():
+def test_readout_noise_has_its_rms_and_repeats_with_its_seed():
     p = readout.build(scale=1.0, grain=0.1, noise=0.3, seed=7)
     y = codes(p, np.zeros(3000)) * 0.1
     assert y.std() == pytest.approx(0.3, rel=0.05) and abs(y.mean()) < 0.03
@@ -28,5 +28,5 @@ def test_noise_has_its_size_and_repeats():
 
 
 @pytest.mark.parametrize(("y", "code"), [(np.nan, 0), (1e12, 2**31 - 1), (-1e12, 1 - 2**31), (np.inf, 2**31 - 1)])
-def test_what_is_out_of_reach_stays_in_the_frame(y, code):
+def test_readout_out_of_range_is_clipped(y, code):
     assert codes(readout.build(1.0, 1e-3, 0.0, 1), [y])[0] == code

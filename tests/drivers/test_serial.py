@@ -1,4 +1,4 @@
-"""A microcontroller as a board: the frame's bytes, the C of the example, and a device that is bad."""
+"""A microcontroller as a board: bytes of the frame, the C code of the example, and faults of the device."""
 
 import os
 import time
@@ -52,13 +52,13 @@ def until_it_fails(card, sample, seconds=5.0):
     pytest.fail(f"nothing failed in {seconds} s")
 
 
-def test_the_checksum_is_that_of_its_name():
+def test_checksum_is_crc_16_ccitt_false():
     data = np.frombuffer(b"123456789", np.uint8)
     assert frame.checksum(data, 0, 9) == 0x29B1  # CRC-16/CCITT-FALSE's check value
 
 
-def test_the_bytes_of_the_outputs_are_those_of_the_manual():
-    """A5 02 07, number 1, on, line 3, 1.5 as a float, and the checksum of all after the first byte."""
+def test_bytes_of_the_output_frame_are_those_of_the_manual():
+    """A5 02 07, number 1, on, line 3, 1.5 as a float, and the checksum of the bytes after the first."""
     ours, theirs = os.pipe()
     line = np.zeros(1, frame.LINE)[0]
     line["fd"], line["writes"], line["outputs"][0] = theirs, 1, 1.5
@@ -70,8 +70,8 @@ def test_the_bytes_of_the_outputs_are_those_of_the_manual():
 
 
 @given(noise=st.binary(max_size=40), cut=st.integers(0, 20))
-def test_a_frame_is_found_in_noise(noise, cut):
-    """Whatever comes before it, the second of two whole frames at the latest is taken."""
+def test_frame_is_found_in_noise(noise, cut):
+    """After any preceding bytes, at the latest the second of two complete frames is found."""
     line = np.zeros(1, frame.LINE)[0]
     line["counters"] = 1
     whole = bytes([0x82, 7, 9, 0, 0, 1, 2, 3, 4])
@@ -82,12 +82,12 @@ def test_a_frame_is_found_in_noise(noise, cut):
     assert (line["answered"], line["counts"][0]) == (9, 0x04030201)
 
 
-def test_the_name_of_the_device_is_told(bench):
+def test_device_name_is_reported(bench):
     card, _ = bench(device={"name": b"bench 7"})
     assert card.name.endswith("(bench 7)")
 
 
-def test_the_device_is_told_whether_the_machine_is_on(bench, sample):
+def test_device_receives_the_on_state_of_the_machine(bench, sample):
     card, device = bench()
     for on in (1, 0):
         card.enable(bool(on))
@@ -96,8 +96,8 @@ def test_the_device_is_told_whether_the_machine_is_on(bench, sample):
         assert (board.on, board.output[0]) == (on, 5.0)
 
 
-def test_the_device_takes_its_outputs_to_zero_by_itself(bench):
-    """Nobody writes any more, as when the computer has died."""
+def test_device_zeroes_its_outputs_after_a_timeout(bench):
+    """No more writes, as after a crash of the computer."""
     card, device = bench(timeout=0.3)
     card.enable(True)
     card.write((1024,), 0)
@@ -145,7 +145,7 @@ def unplugged(device):
         (unplugged, r"could not be sent: the port is gone; was the device pulled out\?|received: the port is gone"),
     ],
 )
-def test_a_bad_device_ends_it(bench, sample, spoil, words):
+def test_faulty_device_ends_the_board(bench, sample, spoil, words):
     card, device = bench(timeout=0.3)
     card.enable(True)
     card.write((1000,), 0)
@@ -178,13 +178,13 @@ def _resealed(body):
         (lambda device: None, {"counters": 0}, r"has 0 counters and the machine has 1"),
     ],
 )
-def test_a_device_that_does_not_fit_is_refused(bench, monkeypatch, prepare, device, words):
+def test_device_that_does_not_fit_the_machine_is_refused(bench, monkeypatch, prepare, device, words):
     monkeypatch.setattr(serial, "HELLO", 0.7)
     with pytest.raises(UserError, match=words):
         bench(prepare=prepare, device=device)
 
 
-def test_lines_that_the_device_cannot_write(bench):
+def test_lines_that_the_device_cannot_write_are_refused(bench):
     with pytest.raises(UserError, match="cannot write line 2"):
         bench(ONE._replace(lines=(0, 2)), device={"lines": 0b1})
 
@@ -197,6 +197,6 @@ def test_lines_that_the_device_cannot_write(bench):
         ({"baud": 12345}, r"driver.baud: 12345 is no rate of a serial line here; there is 9600,"),
     ],
 )
-def test_a_port_that_does_not_open(settings, words):
+def test_unavailable_port_is_an_error(settings, words):
     with pytest.raises(UserError, match=words):
         connect(SerialSettings(**settings))

@@ -1,4 +1,4 @@
-"""Recordings of public repositories as CSV: names, times, and rows that repeat."""
+"""Recordings of public repositories as CSV: names, times, and repeated rows."""
 
 import gzip
 import importlib.util
@@ -15,18 +15,18 @@ spec.loader.exec_module(public)
 
 
 @pytest.mark.parametrize("text", ["a,b\n0, 1\n11, -2\n", "#a\tb\n0\t1\n11\t-2\n", "0 1\n11 -2"])
-def test_rows_of_any_text(text):
+def test_rows_are_read_from_any_text(text):
     assert public.rows_of(text).tolist() == [[0.0, 1.0], [11.0, -2.0]]
 
 
-def test_columns_get_names_and_times_seconds():
+def test_columns_get_names_and_times_in_seconds():
     source = public.Source("a/b", "0", "f", {"t": 0, "x": 2, "push": 1}, every=2, milliseconds=True, centred="push")
     found = public.prepared(source, "100,1,5\n110,1,5\n120,3,6\n130,3,6\n")
     assert {name: values.tolist() for name, values in found.items()} == {
         "t": [0.0, 0.02], "x": [5.0, 6.0], "push": [-1.0, 1.0]}  # fmt: skip
 
 
-def test_what_is_there_is_written_and_the_rest_named(tmp_path, capsys):
+def test_available_recordings_are_written_and_missing_ones_named(tmp_path, capsys):
     source = public.SOURCES["micromouse"]
     file = tmp_path / source.repository / source.file
     file.parent.mkdir(parents=True)

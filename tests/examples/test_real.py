@@ -1,4 +1,4 @@
-"""Recordings of real machines, which lie beside the project where they are there at all: descriptions and verdicts."""
+"""Recordings of real machines (outside of the project, optional): descriptions and verdicts."""
 
 import json
 
@@ -33,7 +33,7 @@ def ran(monkeypatch):
 
 
 @pytest.mark.parametrize("name", DESCRIBED)
-def test_a_recording_is_imported_and_ready_for_a_diagnosis(name, ran, tmp_path):
+def test_real_recording_is_imported_and_ready_for_a_diagnosis(name, ran, tmp_path):
     if missing(CASES[name]):
         pytest.skip(f"{missing(CASES[name])} is not here")
     for words in imports(CASES[name], tmp_path):
@@ -42,7 +42,7 @@ def test_a_recording_is_imported_and_ready_for_a_diagnosis(name, ran, tmp_path):
 
 
 @pytest.mark.parametrize("name", SHORT)
-def test_what_is_found_holds(name, ran, tmp_path):
+def test_diagnosis_of_a_real_recording_agrees_with_the_known_effects(name, ran, tmp_path):
     case = CASES[name]
     for words in imports(case, tmp_path):
         ran(words)
@@ -57,7 +57,7 @@ def test_what_is_found_holds(name, ran, tmp_path):
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_each_case_says_what_is_known_from_elsewhere(name):
+def test_each_case_names_its_independent_knowledge(name):
     assert set(CASES[name]) <= {"machine", "recordings", "map", "unit", "import", "options", "known", "wrong", "short",
                                 "holds"}  # fmt: skip
     assert CASES[name]["known"]

@@ -1,4 +1,4 @@
-"""The pages of proofs and of real machines tell what was found, and show it."""
+"""Pages on proofs and real machines: tables and figures agree with the results."""
 
 import json
 import re
@@ -9,18 +9,18 @@ from run import FOUND, PAGE, page
 MISSING = {"hydraulic_load", "ess_x"}  # no answer in half an hour
 
 
-def test_the_table_is_that_of_what_was_found():
+def test_page_table_agrees_with_the_results():
     text = PAGE.read_text()
     assert page(text) == text
 
 
-def test_every_case_was_run():
+def test_every_case_has_a_result():
     found = {file.stem: json.loads(file.read_text()) for file in FOUND.glob("*.json")}
     assert set(found) | MISSING == set(cases())
     assert all(f["verdict"] in ("named", "ambiguous", "unnamed", "nothing") for f in found.values())
 
 
-def test_no_answer_names_what_would_be_wrong_and_says_nothing_of_it():
+def test_page_marks_every_wrong_answer():
     wrong = {
         name for name, case in cases().items()
         if (file := FOUND / f"{name}.json").exists()
@@ -29,7 +29,7 @@ def test_no_answer_names_what_would_be_wrong_and_says_nothing_of_it():
     assert len(re.findall(r": wrong\*\*", PAGE.read_text())) >= len(wrong)
 
 
-def test_every_figure_is_there():
+def test_every_figure_exists():
     shown = re.findall(r"\(images/(real/[^)]+)\)", (ROOT / "docs" / "real_machines.md").read_text())
     assert len(shown) > 5
     for name in shown:

@@ -1,4 +1,4 @@
-"""Every fault on both machines, in lockstep: what detects it, and that nothing before it is lost."""
+"""Every fault on both machines in lockstep: detection, and no rows lost before the trip."""
 
 from pathlib import Path
 
@@ -12,7 +12,7 @@ from rtctl.faults.play import Outcome, undisturbed
 from rtctl.tick.faults import KINDS, PROCESSES
 
 DOCS = Path(__file__).parents[2] / "docs" / "faults.md"
-UNSEEN = {  # why it is no trip
+UNSEEN = {  # reason for no trip
     "link.loss": "half of the frames are enough",
     "link.reorder": "the newest wins",
     "dac.stuck": "the loop compensates",
@@ -25,29 +25,29 @@ def outcomes(request: pytest.FixtureRequest) -> list[Outcome]:
     return table.boundary(STANDS[request.param], None)
 
 
-def test_every_fault_of_the_catalogue_is_tried_and_explained(outcomes: list[Outcome]) -> None:
+def test_every_fault_of_the_catalogue_is_tested_and_documented(outcomes: list[Outcome]) -> None:
     assert {o.fault for o in outcomes} | set(PROCESSES) == set(KINDS) == set(NOTES)
 
 
-def test_a_fault_is_detected_or_it_is_known_why_not(outcomes: list[Outcome]) -> None:
+def test_fault_is_detected_or_has_a_known_reason(outcomes: list[Outcome]) -> None:
     unseen = UNSEEN if outcomes[0].machine == "ivu" else UNSEEN_BY_LDU
     assert {o.fault for o in outcomes if o.trip is None} == set(unseen)
     assert all(o.error < o.allowed for o in outcomes)
 
 
-def test_a_trip_writes_zero_in_its_own_tick(outcomes: list[Outcome]) -> None:
+def test_trip_writes_zero_in_its_tick(outcomes: list[Outcome]) -> None:
     assert all(o.safe_from_trip == 0 and o.safe == o.detected for o in outcomes if o.trip)
 
 
-def test_zeros_reach_the_machine_unless_the_link_is_what_is_broken(outcomes: list[Outcome]) -> None:
+def test_zero_outputs_reach_the_machine_unless_the_link_is_broken(outcomes: list[Outcome]) -> None:
     assert {o.fault for o in outcomes if o.trip and not o.wire} == {"link.silent"}
 
 
-def test_nothing_is_lost_and_the_machine_runs_again(outcomes: list[Outcome]) -> None:
+def test_no_rows_are_lost_and_the_machine_runs_again(outcomes: list[Outcome]) -> None:
     assert all(o.same and o.lost == 0 and o.again for o in outcomes)
 
 
-def test_the_page_says_what_is_so(outcomes: list[Outcome]) -> None:
+def test_documented_fault_table_agrees_with_the_results(outcomes: list[Outcome]) -> None:
     rate = STANDS[outcomes[0].machine].config().loop.rate
     lines = DOCS.read_text(encoding="utf-8").splitlines()
     assert [
@@ -55,15 +55,15 @@ def test_the_page_says_what_is_so(outcomes: list[Outcome]) -> None:
     ] == []
 
 
-def test_processes_of_the_daemon_do_it_alike(runtime: Path, tmp_path: Path) -> None:
-    """One fault through supervisor, mailbox and recording; the others went the same way inside this process."""
+def test_fault_through_the_daemon_processes_gives_the_same_outcome(runtime: Path, tmp_path: Path) -> None:
+    """One fault through supervisor, mailbox and recording; the others run inside this process."""
     name = "ldu"
     stand = STANDS[name]._replace(cases=STANDS[name].cases[4:5])
     assert table.boundary(stand, tmp_path) == table.boundary(stand, None)
 
 
 @pytest.mark.parametrize("name", STANDS)
-def test_faults_of_processes_are_survived(runtime: Path, tmp_path: Path, name: str) -> None:
+def test_process_faults_are_survived(runtime: Path, tmp_path: Path, name: str) -> None:
     stand = STANDS[name]
     truth = undisturbed(stand)
     for each in ("side_by_side", "plant_killed", "supervisor_killed"):
@@ -78,12 +78,12 @@ def test_faults_of_processes_are_survived(runtime: Path, tmp_path: Path, name: s
 
 
 @pytest.mark.realtime
-def test_a_plant_that_was_killed_comes_back(runtime: Path, tmp_path: Path) -> None:
+def test_killed_plant_reconnects(runtime: Path, tmp_path: Path) -> None:
     assert processes.plant_back(STANDS["ivu"], tmp_path).ok
 
 
-def test_the_table_can_fail() -> None:
-    """A machine whose limits are off does not detect what it should."""
+def test_fault_table_fails_for_a_machine_without_limits() -> None:
+    """A machine without limits does not detect the faults."""
     stand = STANDS["ivu"]
     ticks = stand.ticks(3.0)
     off = {f"safety__{name}": 0.0 for name in ("following_error", "frozen_time", "disagreement", "current_time")}

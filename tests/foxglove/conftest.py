@@ -1,4 +1,4 @@
-"""A viewer that speaks Foxglove's WebSocket protocol, and a machine to look at."""
+"""Fixtures: a viewer with the WebSocket protocol of Foxglove, and a machine."""
 
 import contextlib
 import json
@@ -11,7 +11,7 @@ import pytest
 pytest.importorskip("foxglove", reason="needs the extra foxglove: pip install 'rtctl[foxglove]'")
 websockets = pytest.importorskip("websockets.sync.client", reason="needs the package websockets")
 
-PATIENCE = 20.0  # s for an answer; never waited for where all is well
+PATIENCE = 20.0  # s, timeout of an answer
 
 
 class Viewer:
@@ -30,7 +30,7 @@ class Viewer:
         self._open.close()
 
     def until(self, enough: Callable[[], Any]) -> Any:
-        """Receive until `enough()` is true; returns that."""
+        """Receive until `enough()` is true; returns its value."""
         while not (found := enough()):
             self._take(self.socket.recv(PATIENCE))
         return found
@@ -40,14 +40,14 @@ class Viewer:
             self.until(lambda topic=topic: topic in self.channels)
         chosen = [self.channels[topic]["id"] for topic in topics]
         self._send("subscribe", subscriptions=[{"id": id, "channelId": id} for id in chosen])
-        self.parameters()  # answered after what was sent before
+        self.parameters()  # the answer confirms the earlier messages
 
     def parameters(self, *names: str) -> dict[str, Any]:
         """Values of parameters, of all if no names are given."""
         return self._ask("getParameters", parameterNames=list(names))
 
     def set(self, **values: Any) -> dict[str, Any]:
-        """Set parameters (a__b for a.b); returns the values then in force."""
+        """Set parameters (a__b for a.b); returns the resulting values."""
         parameters = [{"name": name.replace("__", "."), "value": value} for name, value in values.items()]
         return self._ask("setParameters", parameters=parameters)
 
@@ -78,7 +78,7 @@ class Viewer:
 
 @pytest.fixture
 def machine(served: Callable[..., Any], config: Callable[..., Any]) -> Any:
-    """A reel unit that runs."""
+    """A running reel unit."""
     machine = served(config("ivu"))
     machine.bench.ask("arm")
     machine.run(1.0)

@@ -1,4 +1,4 @@
-"""Rows, status, events and parameters as a viewer gets them over the wire."""
+"""Rows, status, events and parameters received by a viewer."""
 
 import json
 
@@ -11,7 +11,7 @@ from rtctl.foxglove.bridge import Bridge
 from rtctl.trace import json_rows
 
 
-def test_every_row_at_the_time_of_its_tick(machine, bridged):
+def test_every_row_has_the_time_of_its_tick(machine, bridged):
     bridge, viewer = bridged(rate=None)
     viewer.subscribe("/ivu")
     rows = machine.run(0.2)
@@ -21,10 +21,10 @@ def test_every_row_at_the_time_of_its_tick(machine, bridged):
     for name in rows.dtype.names:
         assert [message.get(name, np.nan) for message in messages] == pytest.approx(rows[name].tolist(), nan_ok=True)
     assert np.array_equal(np.diff(times), np.diff([round(t * 1e9) for t in rows["t"].tolist()]))
-    assert "/ivu/max" not in viewer.channels  # nothing is left out
+    assert "/ivu/max" not in viewer.channels  # no thinning
 
 
-def test_the_schema_is_that_of_an_exported_file(machine, bridged):
+def test_schema_is_that_of_an_exported_file(machine, bridged):
     _, viewer = bridged()
     channel = viewer.until(lambda: viewer.channels.get("/ivu"))
     assert (channel["encoding"], channel["schemaEncoding"], channel["schemaName"]) == (
@@ -48,7 +48,7 @@ def test_thinned_rows_come_with_their_extremes(machine, bridged):
     assert [at for at, _ in viewer.rows["/ivu"]] == [at for at, _ in viewer.rows["/ivu/max"]]
 
 
-def test_status_and_events_at_their_tick(machine, bridged):
+def test_status_and_events_have_the_time_of_their_tick(machine, bridged):
     bridge, viewer = bridged()
     viewer.subscribe("/ivu/status", "/ivu/events")
     bridge.turn()
@@ -77,7 +77,7 @@ def test_parameters_are_the_settings(machine, bridged):
     assert viewer.parameters("setpoint") == {"setpoint": machine.last_row["target"]}
 
 
-def test_they_are_not_changed_without_control(machine, bridged):
+def test_parameters_are_read_only_without_control(machine, bridged):
     _, viewer = bridged()
     assert viewer.set(law__position__gain=25.0) == {"law.position.gain": 31.0}
     assert machine.changes == []
@@ -107,7 +107,7 @@ def test_control_sets_gain_and_setpoint(machine, bridged):
         ("setpoint", "far", "setpoint"),
     ],
 )
-def test_what_cannot_be_is_refused_in_the_daemons_words(machine, bridged, name, value, why):
+def test_invalid_parameter_is_refused_with_the_message_of_the_daemon(machine, bridged, name, value, why):
     _, viewer = bridged(control=True)
     before = viewer.parameters(name)
     assert viewer.set(**{name.replace(".", "__"): value}) == before
@@ -117,7 +117,7 @@ def test_what_cannot_be_is_refused_in_the_daemons_words(machine, bridged, name, 
     assert machine.changes == []
 
 
-def test_what_somebody_else_changes_is_told(machine, bridged):
+def test_parameter_changes_of_other_clients_are_sent_to_viewers(machine, bridged):
     bridge, viewer = bridged()
     viewer.subscribe("/ivu/events")
     viewer._send("subscribeParameterUpdates", parameterNames=["law.position.gain"])
@@ -130,7 +130,7 @@ def test_what_somebody_else_changes_is_told(machine, bridged):
     viewer.until(lambda: any("gain is 29.0" in e["message"] for _, e in viewer.rows.get("/ivu/events", [])))
 
 
-def test_a_daemon_that_goes_and_comes_back(machine, bridged):
+def test_bridge_reconnects_to_a_restarted_daemon(machine, bridged):
     bridge, viewer = bridged()
     machine.stop()
     bridge._client.timeout = 0.1
@@ -152,7 +152,7 @@ def test_a_daemon_that_goes_and_comes_back(machine, bridged):
     viewer.until(lambda: len(viewer.rows.get("/ivu", [])) == 5)
 
 
-def test_two_viewers(machine, bridged):
+def test_two_viewers_are_served(machine, bridged):
     bridge, first = bridged()
     second = type(first)(bridge.url)
     for viewer in (first, second):
@@ -164,7 +164,7 @@ def test_two_viewers(machine, bridged):
     second.close()
 
 
-def test_rows_that_were_overwritten_are_told(machine, bridged):
+def test_overwritten_rows_are_reported(machine, bridged):
     bridge, viewer = bridged()
     viewer.subscribe("/ivu", "/ivu/events")
     for _ in range(5):
@@ -176,7 +176,7 @@ def test_rows_that_were_overwritten_are_told(machine, bridged):
     assert int(lost[0].split()[0]) >= 5000
 
 
-def test_a_port_that_is_taken(machine, bridged):
+def test_port_in_use_is_an_error(machine, bridged):
     bridge, _ = bridged()
     with pytest.raises(UserError, match="choose another --port"):
         Bridge(Client(machine.endpoint), "127.0.0.1", bridge._server.port, None, False)

@@ -1,4 +1,4 @@
-"""Thinned rows hide nothing."""
+"""Thinned rows keep all extremes."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ def rows_of(values):
 
 @settings(deadline=None)
 @given(st.lists(st.floats(-1e3, 1e3), max_size=60), st.integers(1, 9), st.lists(st.integers(0, 60), max_size=5))
-def test_extremes_are_those_of_all_rows_however_they_come(values, every, cuts):
+def test_extremes_are_those_of_all_rows_for_any_batches(values, every, cuts):
     rows = rows_of(values)
     envelope = Envelope(every)
     parts = [envelope.feed(part) for part in np.split(rows, sorted(min(cut, len(rows)) for cut in cuts))]
@@ -35,12 +35,12 @@ def test_extremes_are_those_of_all_rows_however_they_come(values, every, cuts):
     assert np.array_equal(low["t"], newest["t"]) and np.array_equal(high["tick"], newest["tick"])
 
 
-def test_nan_counts_only_where_there_is_nothing_else():
+def test_extreme_is_nan_only_if_all_values_are_nan():
     thinned = Envelope(2).feed(rows_of([np.nan, 1.0, np.nan, np.nan]))
     assert thinned.low["u"][0] == thinned.high["u"][0] == 1.0
     assert np.isnan(thinned.low["u"][1])
 
 
-def test_at_least_one():
+def test_envelope_of_zero_rows_is_refused():
     with pytest.raises(ValueError, match="every is 0"):
         Envelope(0)

@@ -11,14 +11,14 @@ import pytest
 
 layouts = pytest.importorskip("foxglove.layouts", reason="foxglove-sdk is not installed")
 DOCS = Path(__file__).parents[2] / "docs" / "foxglove"
-PANELS = {  # name in the app: configuration and series in the SDK
+PANELS = {  # panel name in the app: configuration and series in the SDK
     "Plot": (layouts.PlotConfig, layouts.PlotSeries),
     "StateTransitions": (layouts.StateTransitionsConfig, layouts.StateTransitionsSeries),
     "RosOut": (layouts.LogConfig, None),
     "RawMessages": (layouts.RawMessagesConfig, None),
     "Parameters": (None, None),
 }
-CALLED = {"RosOut": "Log"}  # the app's name of a panel -> the SDK's
+CALLED = {"RosOut": "Log"}  # panel name in the app -> in the SDK
 TITLE = "foxglovePanelTitle"
 
 
@@ -27,7 +27,7 @@ def read(name):
 
 
 def allowed(cls):
-    """Key of the file -> values that are allowed, None for any."""
+    """Key of the file -> allowed values, None for any."""
     hints = typing.get_type_hints(cls)
     found = {}
     for key in cls()._to_dict():
@@ -39,7 +39,7 @@ def allowed(cls):
 
 
 @pytest.mark.parametrize("machine", ["ivu", "ldu"])
-def test_every_key_is_one_that_foxglove_knows(machine):
+def test_foxglove_knows_every_key_of_a_layout(machine):
     for name, config in read(f"{machine}.json")["configById"].items():
         cls, series = PANELS[name.split("!")[0]]
         known = allowed(cls) if cls else {}
@@ -56,7 +56,7 @@ def test_every_key_is_one_that_foxglove_knows(machine):
 
 
 def panels(content):
-    """(type, title, paths) of each panel of the SDK's form, from left to right."""
+    """(type, title, paths) of each panel in SDK form, from left to right."""
     if content["type"] == "panel":
         paths = [path["value"] for path in content.get("config", {}).get("paths", ())]
         return [(content["panelType"], content.get("title"), paths)]
@@ -68,7 +68,7 @@ def leaves(layout):
 
 
 @pytest.mark.parametrize("machine", ["ivu", "ldu"])
-def test_both_forms_show_the_same(machine):
+def test_app_and_sdk_layouts_show_equal_panels(machine):
     app, sdk = read(f"{machine}.json"), read(f"{machine}.v1.json")
     assert sdk["version"] == json.loads(layouts.Layout(content=layouts.ParametersPanel()).to_json())["version"]
     expected = []

@@ -1,4 +1,4 @@
-"""Feeds inputs to a target in a process of its own, so that a crash, a hang or a bomb is a finding and names its input.
+"""Feeds inputs to a target in a separate process: a crash, a hang or memory growth is a finding with its input.
 
 The child writes every input into shared memory before it is taken. The parent looks whether the number of the input
 moves: a child that stands still is killed, one that died is replaced, and the input that it left is reported.
@@ -25,11 +25,11 @@ from typing import Any, NamedTuple
 from target import Kind
 
 SHM = Path("/dev/shm")
-LONGEST = 1 << 20  # bytes of an input that are kept
+LONGEST = 1 << 20  # bytes kept of an input
 HEAD = struct.Struct("<qq")  # number of the input, its length
-ROOM = 2 << 30  # bytes of address space that a target may take besides what is there when it begins
-GROWTH = 256 << 20  # bytes that one input may add to the memory that is in use
-MOST = 10  # findings a target, each of another kind
+ROOM = 2 << 30  # bytes, additional address space of a target
+GROWTH = 256 << 20  # bytes, additional memory of one input
+MOST = 10  # findings per target, each of a different kind
 
 
 class Finding(NamedTuple):
@@ -148,7 +148,7 @@ def _child(kind: Kind, inputs: int, seed: str, folder: str, shared: mmap.mmap, t
 
 
 def _tried(feed: Callable[[bytes], None], data: bytes) -> str:
-    """What is wrong with how the target took it; nothing where it is fine."""
+    """Failure of the target for an input; empty if there is none."""
     try:
         feed(data)
     except Exception as error:
@@ -158,5 +158,5 @@ def _tried(feed: Callable[[bytes], None], data: bytes) -> str:
 
 
 def _peak() -> int:
-    """Most memory that was ever in use, bytes."""
+    """Peak memory, bytes."""
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024

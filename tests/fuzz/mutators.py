@@ -1,4 +1,4 @@
-"""Inputs nobody would send: valid ones with some bytes, or some values, changed."""
+"""Mutated inputs: valid inputs with changed bytes or values."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -20,7 +20,7 @@ NUMBERS = (
 
 
 def of_bytes(rng: Random, seeds: Sequence[bytes]) -> bytes:
-    """A seed with one to four of its places changed; sometimes nothing but noise."""
+    """A seed with one to four changed places; sometimes only noise."""
     if rng.random() < 0.02:
         return rng.randbytes(rng.randrange(200))
     data = bytearray(rng.choice(seeds))
@@ -71,7 +71,7 @@ def word(rng: Random) -> str:
 
 
 def value(rng: Random, depth: int = 0) -> Any:
-    """Anything that msgpack and JSON know, and some of what they know but nobody means."""
+    """Any value of msgpack and JSON, with unusual ones."""
     kinds: tuple[Callable[[], Any], ...] = (
         lambda: rng.choice((None, True, False)),
         lambda: rng.choice(NUMBERS),

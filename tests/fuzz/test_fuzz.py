@@ -1,4 +1,4 @@
-"""A short run of every target, and what hypothesis makes of the same readers. `benchmarks/fuzz.py` is the long one."""
+"""A short fuzz run of every target, and hypothesis on the same readers. `benchmarks/fuzz.py` is the long run."""
 
 import json
 import subprocess
@@ -22,7 +22,7 @@ TREES = st.recursive(
 
 
 @pytest.mark.parametrize("name", TARGETS)
-def test_no_input_is_taken_badly(name):
+def test_fuzz_run_of_a_target_has_no_findings(name):
     outcome = run(name, TARGETS[name], INPUTS.get(name, 400), seed=2, patience=60.0)
     assert [(finding.what, finding.input[:300]) for finding in outcome.findings] == []
     assert outcome.inputs == INPUTS.get(name, 400)
@@ -41,25 +41,25 @@ def target(request, tmp_path_factory):
     | TREES.map(lambda tree: json.dumps(tree).encode())
     | st.sampled_from(UNITS).flatmap(lambda unit: st.text(max_size=9).map(lambda text: (unit + text).encode()))
 )
-def test_nothing_that_hypothesis_thinks_of_is_taken_badly(target, data):
+def test_hypothesis_finds_no_failing_input(target, data):
     target.feed(data)
 
 
 @settings(deadline=None, max_examples=60)
 @given(op=st.sampled_from(REQUESTS), args=st.dictionaries(st.sampled_from(["value", "path", "unit", "seconds"]), TREES))
-def test_plausible_requests_with_strange_arguments(tmp_path_factory, op, args):
+def test_plausible_requests_with_random_arguments(tmp_path_factory, op, args):
     feed = TARGETS["request"].make(tmp_path_factory.getbasetemp()).feed
     feed(msgpack.packb({**msgpack.unpackb(op), "args": args}))
 
 
 @settings(deadline=None, max_examples=60)
 @given(key=st.sampled_from(sorted(CASE)), value=TREES)
-def test_a_case_with_one_strange_value(tmp_path_factory, key, value):
+def test_case_with_one_random_value(tmp_path_factory, key, value):
     feed = TARGETS["case"].make(tmp_path_factory.mktemp("case", numbered=True)).feed
     feed(json.dumps({**CASE, key: value}).encode())
 
 
-def test_the_program_counts_and_fails_where_it_should(tmp_path):
+def test_fuzz_program_counts_its_inputs_and_findings(tmp_path):
     program = Path(__file__).parents[2] / "benchmarks" / "fuzz.py"
     words = [sys.executable, program, "--json", "--inputs", "300", "--target", "request", "--target", "reply"]
     done = subprocess.run(words, capture_output=True, text=True, cwd=tmp_path)

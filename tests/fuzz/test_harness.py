@@ -1,4 +1,4 @@
-"""The watchdog must see what it is there for: each way to go wrong is planted, and found with its input."""
+"""Fuzz harness: each planted failure is found with its input."""
 
 import faulthandler
 import os
@@ -16,7 +16,7 @@ BAD = b"bad"
 
 
 def planted(what):
-    """A target that takes anything but BAD, the fifth of its inputs."""
+    """A target that accepts every input except BAD, its fifth input."""
 
     def make(_):
         numbers = iter(range(1, 10**6))
@@ -70,7 +70,7 @@ def bursts():
         (bursts, ("MemoryError", "Unable to allocate")),
     ],
 )
-def test_what_goes_wrong_is_found_with_its_input(what, told):
+def test_planted_failure_is_found_with_its_input(what, told):
     core = resource.getrlimit(resource.RLIMIT_CORE)
     resource.setrlimit(resource.RLIMIT_CORE, (0, core[1]))
     found = run("planted", planted(what), 20)
@@ -80,18 +80,18 @@ def test_what_goes_wrong_is_found_with_its_input(what, told):
     assert {finding.input for finding in found.findings} == {BAD}
 
 
-def test_a_hang_is_found_and_the_rest_goes_on():
+def test_hang_is_found_and_the_run_continues():
     found = run("planted", planted(hangs), 8, patience=0.3)
     assert [finding.what for finding in found.findings] == ["no end within 0.3 s"]
     assert found.findings[0].input == BAD and found.inputs == 8
 
 
-def test_nothing_is_found_where_nothing_is_wrong():
+def test_correct_target_has_no_findings():
     found = run("planted", planted(lambda: None), 500)
     assert (found.inputs, found.findings) == (500, [])
 
 
-def test_the_same_seed_gives_the_same_inputs():
+def test_equal_seeds_give_equal_inputs():
     def remember(_):
         def feed(data):
             raise ValueError(data.hex())

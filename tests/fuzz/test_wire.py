@@ -1,4 +1,4 @@
-"""Bytes that are no ZeroMQ at all, and ZeroMQ with places changed, against sockets that live on."""
+"""Random bytes and mutated ZeroMQ against the sockets of a daemon; the sockets must keep working."""
 
 import random
 import socket as sockets
@@ -34,7 +34,7 @@ def blobs():
 
 
 def throw(path, data):
-    """Connect, send, and go: without waiting for an answer, as who floods would."""
+    """Connect, send and close without waiting for an answer."""
     with sockets.socket(sockets.AF_UNIX) as thrower:
         thrower.settimeout(10)
         thrower.connect(str(path))
@@ -49,7 +49,7 @@ def throw(path, data):
             raise AssertionError(f"neither answered nor cut off: {data[:200]!r}") from None
 
 
-def test_the_command_socket_lives_on(context, tmp_path):
+def test_command_socket_survives_random_bytes(context, tmp_path):
     server = CommandServer(f"ipc://{tmp_path}/c", None, context)
     for data in blobs():
         throw(tmp_path / "c", data)
@@ -64,7 +64,7 @@ def test_the_command_socket_lives_on(context, tmp_path):
     server.close()
 
 
-def test_the_telemetry_lives_on(context, tmp_path):
+def test_telemetry_socket_survives_random_bytes(context, tmp_path):
     telemetry = Telemetry(f"ipc://{tmp_path}/t", "ivu", ["v"], context)
     for data in blobs():
         throw(tmp_path / "t", data)

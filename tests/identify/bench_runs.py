@@ -1,4 +1,4 @@
-"""Records of bench experiments on emulated machines, each played once for all tests that look at it."""
+"""Records of bench experiments on emulated machines, cached for all tests."""
 
 import json
 from functools import lru_cache
@@ -29,7 +29,7 @@ def played(experiment: Any, name: str, *arguments: Any) -> Record:
 
 
 def made(name: str, columns: dict[str, Any], dt: float = 0.002) -> Record:
-    """A record of columns that were never played."""
+    """A synthetic record of the given columns."""
     n = len(next(iter(columns.values())))
     given = {"t": np.arange(n) * dt, "tick": np.arange(n), **columns}
     loaded = config(name)

@@ -1,4 +1,4 @@
-"""Runs for frequency responses, each played once for all tests that look at it, and records made of arrays."""
+"""Runs for frequency responses, cached for all tests, and synthetic records."""
 
 import json
 from functools import lru_cache
@@ -25,7 +25,7 @@ def config(name: str = "ivu", **changes: Any) -> Any:
 
 
 def reels(R1: float, R2: float, **parameters: float) -> Any:
-    """The reel unit with these radii, for the laws and for the emulator, and parameters of its plant."""
+    """Settings of the reel unit with the given radii (laws and emulator) and plant parameters."""
     return config(plant__parameters={"R1": R1, "R2": R2, **parameters}, radius={"source": "given", "R1": R1, "R2": R2})
 
 
@@ -60,7 +60,7 @@ def response(name: str = "ivu", motor: int = 1) -> best_linear.BestLinear:
 def made_up(
     u: np.ndarray, y: np.ndarray, w: np.ndarray, excitation: dict[str, Any], rate: float = 1000.0, speed: float = 0.01
 ) -> Record:
-    """A record of the axis that moves at `speed` m/s, with `y` on top of it, as if it had been played."""
+    """Synthetic record of the axis at `speed` m/s with superposed `y`."""
     made = set_path(set_path(config("axis"), "excitation", excitation), "loop.rate", rate)
     n = len(u)
     t = np.arange(n) / rate

@@ -1,4 +1,4 @@
-"""What bench experiments share: changes are checked, a trip is no record, a config's length is known."""
+"""Common parts of bench experiments: checked settings, trips, and length of a config."""
 
 import bench_runs as runs
 import numpy as np
@@ -8,7 +8,7 @@ from rtctl.config.errors import NoAnswer, UserError
 from rtctl.identify import bench
 
 
-def test_changes_are_checked():
+def test_settings_of_an_experiment_are_validated():
     config = bench.changed(runs.config("ivu"), {"law.position.gain": 3.0})
     assert config.law.position.gain == 3.0
     assert config.excitation.kind == "none"
@@ -16,7 +16,7 @@ def test_changes_are_checked():
         bench.changed(config, {"law.position.gian": 3.0})
 
 
-def test_a_trip_is_no_record():
+def test_tripped_experiment_is_refused():
     config = bench.changed(
         runs.config("ivu"),
         {
@@ -29,7 +29,7 @@ def test_a_trip_is_no_record():
         bench.play(config)
 
 
-def test_length_of_a_config():
+def test_length_of_an_experiment_config():
     steps = {"steps": [{"at": 1.0, "to": 2.0, "ramp": 0.5}, {"at": 6.0, "to": 0.0}]}
     config = bench.changed(runs.config("ivu"), {"reference": steps})
     assert bench.seconds(config) == pytest.approx(6.0 + bench.REST + bench.ARMING["given"])
@@ -37,7 +37,7 @@ def test_length_of_a_config():
     assert bench.seconds(knots) > 9.0
 
 
-def test_ramps():
+def test_ramps_of_an_experiment():
     t = np.arange(0, 10, 0.01)
     ref = np.interp(t, [0, 1, 4, 5, 9, 10], [0, 0, 3, 3, -1, -1])
     found = bench.ramps(t, ref, 0.5)

@@ -1,4 +1,4 @@
-"""The driver's curve: (12.3) where the amplifier has it, a straight line where it is linear, nothing while it turns."""
+"""Driver curve: (12.3) for the measured amplifier, a straight line for the linear one, refused while turning."""
 
 import bench_runs as runs
 import numpy as np
@@ -10,7 +10,7 @@ from rtctl.config.errors import NoAnswer, UserError
 from rtctl.identify import driver_curve as dc
 
 
-def test_measured_amplifier():
+def test_curve_of_the_measured_amplifier():
     """12.2: 4.2e-2 A below 0.8 V, which is 8.8e-4 Nm; 0.262 A at 3 V by its equation."""
     curve = dc.driver_curve(runs.played(dc.driver_config, "ldu_printer"))
     assert len(curve.levels) == 31
@@ -23,7 +23,7 @@ def test_measured_amplifier():
 
 @settings(deadline=None, max_examples=50)
 @given(I_0=st.floats(0.01, 0.1), V_k=st.floats(0.4, 2.0), gain=st.floats(0.05, 0.5), seed=st.integers(0, 99))
-def test_fit_through_noise(I_0, V_k, gain, seed):
+def test_curve_is_fitted_through_noise(I_0, V_k, gain, seed):
     V = np.arange(31) * 0.1
     noise = 1e-4 * np.random.default_rng(seed).standard_normal(31)
     amperes = I_0 + gain * np.maximum(V - V_k, 0) + noise
@@ -33,13 +33,13 @@ def test_fit_through_noise(I_0, V_k, gain, seed):
     assert curve.V_k == pytest.approx(V_k, abs=0.03)
 
 
-def test_a_straight_line_has_no_knee():
+def test_linear_curve_has_no_knee():
     curve = dc.fit(tuple(dc.Level(0.1 * k, 0.01 * k, 0.0, 7500) for k in range(31)))
     assert (curve.I_0, curve.V_k) == (0.0, 0.0)
     assert curve.at_3 == pytest.approx(0.3)
 
 
-def test_a_motor_that_turns_is_refused():
+def test_turning_motor_is_refused():
     n = 20_000
     columns = {"u": np.repeat([0.5, 1.0], n // 2), "truth_current": np.full(n, 0.05), "encoder_counts": np.arange(n)}
     with pytest.raises(NoAnswer, match=r"the motor turns from 0\.00 s on"):
@@ -51,6 +51,6 @@ def test_a_motor_that_turns_is_refused():
         dc.driver_curve(runs.made("ldu", columns, 1e-4))
 
 
-def test_it_never_writes_what_makes_the_amplifier_run_away():
+def test_experiment_stays_below_the_runaway_voltage():
     with pytest.raises(UserError, match=r"runs away above 3\.0 V"):
         dc.driver_config(runs.config("ldu_printer"), 3.5)

@@ -1,4 +1,4 @@
-"""Experiments stay within the machine's limits and hold the stretches that their readers need."""
+"""Identification experiments: machine limits, and intervals required by the estimators."""
 
 import frf_runs
 import numpy as np
@@ -10,7 +10,7 @@ from rtctl.identify.records import steady
 
 
 @pytest.mark.parametrize("name, speed", [("ivu", 1.97), ("ldu", 5e-3)])
-def test_a_multisine_is_played_at_constant_speed_to_and_fro(name, speed):
+def test_multisine_is_played_at_constant_speed_back_and_forth(name, speed):
     record = frf_runs.shipped(name)[0]
     whole = [s for s in steady(record, 0.0) if (s.stop - s.start) * record.dt > 5 * experiment.PERIOD]
     assert len(whole) == 2
@@ -22,20 +22,20 @@ def test_a_multisine_is_played_at_constant_speed_to_and_fro(name, speed):
 
 
 @pytest.mark.parametrize("name", ["ivu", "ldu"])
-def test_the_drive_and_the_tape_keep_their_limits(name):
+def test_drive_and_tape_stay_within_their_limits(name):
     record = frf_runs.shipped(name)[0]
     assert max(np.abs(record[u]).max() for u in record.signals.written) < (9.0 if name == "ivu" else 3.0)
     if name == "ivu":
         assert record["truth_tension1"][500:].min() > 0.0
         assert record["truth_tension2"][500:].min() > 0.0
-        assert abs(record["R1"].mean() - 0.038) < 1e-4  # to and fro about the radius that it began with
+        assert abs(record["R1"].mean() - 0.038) < 1e-4  # back and forth about the initial radius
 
 
-def test_noise_has_as_many_windows_as_asked_for():
+def test_noise_record_has_the_requested_number_of_windows():
     assert len(experiment.noise(frf_runs.config())) == 1
     runs = experiment.noise(frf_runs.config("ldu"))
     seeds = [e.config.excitation.seed for e in runs]
-    assert len(runs) == 7 and len(set(seeds)) == 7  # 6.55 s of noise that do not repeat in each
+    assert len(runs) == 7 and len(set(seeds)) == 7  # 6.55 s of noise without repetition in each run
     assert runs[0].config.excitation.f_max == 1000.0
 
 
@@ -46,7 +46,7 @@ def test_realisations_differ_in_their_seed_only():
     assert same == one.config.excitation and one.config.law == two.config.law
 
 
-def test_what_the_machine_cannot_take_is_refused():
+def test_experiment_beyond_the_machine_limits_is_refused():
     with pytest.raises(UserError, match=r"peaks at some 8 V, the drive takes 5 V; take 1\.2 V or less"):
         experiment.multisine(frf_runs.config(), rms=2.0)
     with pytest.raises(UserError, match="the drive takes 3 V"):
@@ -57,7 +57,7 @@ def test_what_the_machine_cannot_take_is_refused():
         experiment.noise(frf_runs.config("axis"))
 
 
-def test_own_gains_can_be_kept():
+def test_configured_gains_can_be_kept():
     kept = experiment.noise(frf_runs.config(), keep_law=True)[0].config
     assert kept.law.position == frf_runs.config().law.position
     assert kept.law.allocation.kind == "motor1"

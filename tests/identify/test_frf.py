@@ -1,4 +1,4 @@
-"""A measured response with its deviation: bands, interpolation, the drive divided out, and lines that prove nothing."""
+"""Measured response with deviation: bands, interpolation, division by the drive, and insignificant lines."""
 
 import frf_runs
 import numpy as np
@@ -19,13 +19,13 @@ def mass(sd: float = 0.01) -> frf.Frf:
     return frf.Frf(F, H, sd * np.abs(H), "ivu", 1, 0.038, 0.022, 0.002, 1.0, False)
 
 
-def test_a_mass_is_interpolated_without_error():
+def test_response_of_a_mass_is_interpolated_without_error():
     assert mass().at(1.0) == pytest.approx(5.1 / (2j * np.pi) ** 2, rel=1e-12)
     with pytest.raises(UserError, match="outside of the response"):
         mass().at(200.0)
 
 
-def test_the_band_holds_95_percent():
+def test_confidence_band_covers_95_percent():
     rng = np.random.default_rng(1)
     one = frf.Frf(np.ones(1), np.ones(1) + 0j, np.full(1, 0.1), "ivu", 1, 0.0, 0.0, 0.002, 1.0, False)
     low, high = one.band()
@@ -34,7 +34,7 @@ def test_the_band_holds_95_percent():
     assert low[0] == pytest.approx(2 - high[0])
 
 
-def test_the_drive_is_divided_out_once():
+def test_drive_is_divided_out_once():
     per_ampere = mass().without_drive(frf_runs.config())
     assert abs(per_ampere.at(1.0)) * (2 * np.pi) ** 2 == pytest.approx(5.1 / 0.2, rel=1e-3)
     assert per_ampere.relative == pytest.approx(mass().relative)
@@ -42,7 +42,7 @@ def test_the_drive_is_divided_out_once():
         per_ampere.without_drive(frf_runs.config())
 
 
-def test_the_drives_are_those_of_the_machines():
+def test_drive_response_is_that_of_the_machine():
     assert abs(frf.drive(frf_runs.config("ldu"), np.array([1.0]))[0]) == pytest.approx(0.1, rel=1e-3)
     assert abs(frf.drive(frf_runs.config("ldu"), np.array([2000.0]))[0]) == pytest.approx(0.1 / np.sqrt(2), rel=1e-3)
     with pytest.raises(UserError, match="no drive"):
@@ -51,7 +51,7 @@ def test_the_drives_are_those_of_the_machines():
 
 @settings(deadline=None, max_examples=20)
 @given(st.integers(0, 1000))
-def test_noise_alone_is_not_carried(seed):
+def test_lines_of_noise_alone_are_insignificant(seed):
     rng = np.random.default_rng(seed)
     relative = 1 / np.abs(rng.standard_normal(300) + 1j * rng.standard_normal(300)) * np.sqrt(2)
     assert frf.carried(relative).sum() <= 3

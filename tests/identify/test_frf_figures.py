@@ -1,4 +1,4 @@
-"""Every picture can be drawn, shows its parts, and says where it cannot be written."""
+"""Figures of frequency responses: content, and unwritable files."""
 
 from typing import Any
 
@@ -18,7 +18,7 @@ def legend(figure: Any) -> list[str]:
     return [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
 
 
-def test_the_sensitivity(tmp_path):
+def test_figure_of_the_sensitivity(tmp_path):
     result = sensitivity.identify(frf_runs.noise())
     figure = frf_figures.sensitivity(result, model=result.S)
     assert labels(figure) == ["|S| [dB]", "phase of S [deg]", "coherence", "|H| [dB, rad/V]"]
@@ -28,12 +28,12 @@ def test_the_sensitivity(tmp_path):
         plot.save(figure, tmp_path / "none" / "s.png")
 
 
-def test_the_best_linear_approximation():
+def test_figure_of_the_best_linear_approximation():
     figure = frf_figures.best_linear(frf_runs.response())
     assert legend(figure)[-1] == "even distortion"
 
 
-def test_the_fit_with_a_colour_for_each_response():
+def test_figure_of_the_fit_has_a_colour_for_each_response():
     frfs = [frf_runs.response("ivu", motor).frf for motor in (1, 2)]
     figure = frf_figures.model_fit(model_fit.fit(frfs, frf_runs.config()))
     said = legend(figure)

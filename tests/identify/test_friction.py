@@ -1,4 +1,4 @@
-"""Friction: the emulators' own comes back, (8.3) is fitted where the points carry it, and refused where not."""
+"""Friction: parameters of the emulator are recovered; (8.3) is fitted if the points support it, else refused."""
 
 import bench_runs as runs
 import numpy as np
@@ -30,8 +30,8 @@ def stribeck_break_away(config):
     return fr.break_away_config(rubs(config), 1)
 
 
-def test_both_motors_of_the_reel_unit():
-    """Seen as one: between the 2.4 and the 2.6 mNm that they have, and the capstan's share."""
+def test_common_friction_of_both_motors_of_the_reel_unit():
+    """Common value: between 2.4 and 2.6 mNm of the motors, plus the share of the capstan."""
     points, refused = fr.constant_velocity(runs.played(velocity, "ivu", *SPEEDS), 3)
     assert not refused and len(points) == 6
     for p in points:
@@ -40,7 +40,7 @@ def test_both_motors_of_the_reel_unit():
         assert p.error < 0.01 * abs(p.force)
 
 
-def test_motors_are_told_apart_by_three_pairs_of_reels():
+def test_friction_of_each_motor_is_identified_from_three_pairs_of_reels():
     records = []
     for R1, R2 in REELS:
         config = runs.config("ivu", radius__R1=R1, radius__R2=R2, plant__parameters__R1=R1, plant__parameters__R2=R2)
@@ -54,12 +54,12 @@ def test_motors_are_told_apart_by_three_pairs_of_reels():
         fr.split(records[:1], 4)
 
 
-def test_break_away_of_the_reel_unit():
+def test_break_away_force_of_the_reel_unit():
     for p in fr.break_away(runs.played(fr.break_away_config, "ivu", 1)):
         assert abs(p.force) == pytest.approx(2.64e-3, rel=0.03)
 
 
-def test_break_away_of_the_printer_is_that_of_the_thesis():
+def test_break_away_voltage_of_the_printer_is_that_of_the_thesis():
     """12.6: 0.93 V forwards, 0.88 V backwards, by a weak spring."""
     forward, backward = fr.break_away(runs.played(fr.break_away_config, "ldu_printer", 1))
     assert forward.force == pytest.approx(0.93, abs=0.006)
@@ -68,7 +68,7 @@ def test_break_away_of_the_printer_is_that_of_the_thesis():
     assert backward.newtons == pytest.approx(-7.0, rel=0.01)
 
 
-def test_printer_at_constant_speed_has_no_fall():
+def test_friction_of_the_printer_has_no_stribeck_effect():
     """12.6: no decrease at small velocities, nor a significant viscous friction."""
     record = runs.played(printer_velocity, "ldu_printer")
     points, _ = fr.constant_velocity(record, 2)
@@ -82,7 +82,7 @@ def printer_velocity(config):
     return fr.velocity_config(config, (2.0, 6.0, 12.0, 18.0), 2)
 
 
-def test_stribeck_of_the_reel_unit():
+def test_stribeck_friction_of_the_reel_unit():
     points, _ = fr.points_of([runs.played(stribeck_break_away, "ivu"), runs.played(stribeck_velocity, "ivu")], 2)
     result = fr.friction(points, [], "ivu")
     # motor 1 carries 22/(22 + 38) of the whole along the tape
@@ -92,7 +92,7 @@ def test_stribeck_of_the_reel_unit():
         assert fit.v_s == pytest.approx(0.3 * 38 / 12.5, rel=0.05)
 
 
-def test_what_is_too_short_or_never_moves_is_refused():
+def test_short_or_motionless_record_is_refused():
     record = runs.played(velocity, "ivu", *SPEEDS)
     with pytest.raises(NoAnswer, match=r"3\.\d turns at constant speed; it takes 12"):
         fr.constant_velocity(record, 12)
@@ -104,7 +104,7 @@ def test_what_is_too_short_or_never_moves_is_refused():
         fr.break_away(runs.made("ivu", held))
 
 
-def test_a_drive_at_its_limit_is_no_break_away():
+def test_saturated_drive_is_no_break_away():
     n = 2000
     u = np.minimum(np.linspace(0, 20, n), 10.0)
     moved = np.where(np.arange(n) > 1500, np.arange(n) - 1500.0, 0.0) * 1e-2
@@ -113,14 +113,14 @@ def test_a_drive_at_its_limit_is_no_break_away():
         fr.break_away(runs.made("ivu", columns | {"R1": np.full(n, 0.03), "R2": np.full(n, 0.03)}))
 
 
-def test_a_fast_rise_is_no_break_away():
-    """The start of an ordinary move: the force grows by what it takes to accelerate."""
+def test_fast_rise_is_no_break_away():
+    """Start of a normal move: the force includes the acceleration."""
     with pytest.raises(NoAnswer, match="no slow ramp"):
         fr.break_away(runs.played(velocity, "ivu", *SPEEDS))
 
 
-def test_a_spring_makes_no_stribeck():
-    """12.6: forwards it takes more at constant speed than at home, backwards less, and the mean of both as much."""
+def test_spring_force_is_not_a_stribeck_effect():
+    """12.6: more force at constant speed forwards, less backwards, and the same mean as at the home position."""
     speeds = (1.5, 3.0, 6.0, 12.0)
     points = [fr.Point(0.0, sign * 0.9 + 0.025, 0.0, 0.0) for sign in (1, -1)]
     points += [fr.Point(sign * v, sign * 0.9 + 0.06, 0.0, 0.0) for v in speeds for sign in (1, -1)]
@@ -130,6 +130,6 @@ def test_a_spring_makes_no_stribeck():
     assert (result.forward.F_C, result.backward.F_C) == pytest.approx((0.96, 0.84))
 
 
-def test_an_axis_has_no_capstan():
+def test_axis_has_no_capstan_friction():
     with pytest.raises(UserError, match="for ivu and ldu, not for axis"):
         fr.velocity_config(runs.config("axis"), [1.0])

@@ -1,4 +1,4 @@
-"""Luminance of a grey image: it carries the pattern of the position error, and nothing where there is none."""
+"""Luminance of a grey image: correlation with the position error."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ def error(amplitude=5.8e-6, wavelength=TURN):
     return 6e-4 * X + amplitude * np.sin(2 * np.pi * X / wavelength)
 
 
-def test_luminance_shares_the_turn_of_the_capstan():
+def test_luminance_has_the_wavelength_of_the_capstan():
     image = lu.printed(X, error())
     cross = lu.cross_spectrum(X, error(), image, 1200, 0.6)
     (first, *_) = lu.shared(cross)
@@ -26,7 +26,7 @@ def test_luminance_shares_the_turn_of_the_capstan():
     assert cross.S[k] == cross.E[k] * cross.Gamma[k]
 
 
-def test_band_of_figure_11_10():
+def test_luminance_band_of_figure_11_10():
     band = lu.band_pass(lu.printed(X, error()))
     assert band.wavelength == pytest.approx(TURN, rel=2e-3)
     assert band.ripple < 0.15  # a relatively constant amplitude
@@ -34,8 +34,8 @@ def test_band_of_figure_11_10():
 
 @settings(deadline=None, max_examples=20)
 @given(amplitude=st.floats(1e-6, 1e-5))
-def test_luminance_grows_with_the_error(amplitude):
-    """Closer lines are darker: dL is that of the coverage, by the way over `lead`."""
+def test_luminance_amplitude_is_proportional_to_the_error(amplitude):
+    """Closer lines are darker: dL follows the coverage, from the travel over `lead`."""
     s = lu.PrintSettings(noise=0.0, drift=0.0)
     image = lu.printed(X, error(amplitude), s)
     gap = 2 * amplitude * np.sin(np.pi * s.lead / TURN)  # amplitude of e(x + lead) - e(x)
@@ -44,7 +44,7 @@ def test_luminance_grows_with_the_error(amplitude):
     assert np.ptp(image.L[20:-20]) / 2 == pytest.approx(slope * gap * aperture, rel=0.12)
 
 
-def test_an_even_image_shares_nothing():
+def test_even_image_does_not_correlate_with_the_error():
     image = lu.printed(X, 6e-4 * X)
     with pytest.raises(NoAnswer, match="share no wavelength"):
         lu.shared(lu.cross_spectrum(X, error(), image, 1200, 0.6))
@@ -52,7 +52,7 @@ def test_an_even_image_shares_nothing():
         lu.band_pass(image)
 
 
-def test_bad_records_are_refused():
+def test_invalid_records_are_refused():
     with pytest.raises(NoAnswer, match="an image takes 100"):
         lu.printed(X[:100], 0 * X[:100])
     with pytest.raises(NoAnswer, match="overtake"):

@@ -1,4 +1,4 @@
-"""The fit finds what the emulator hides, its intervals hold the truth, and it refuses what the data do not carry."""
+"""Model fit: parameters of the emulator, coverage of the intervals, and refusal of uninformative data."""
 
 from functools import lru_cache
 
@@ -14,7 +14,7 @@ BELIEVED = {"J_m": 1.5e-3, "c": 450.0, "k": 12.5, "c_m": 12.0, "k_m": 1.3e-2}
 
 
 def unknown(seed: int, sides: tuple[str, ...] = ("",)) -> dict[str, float]:
-    """Parameters within 30 % of what is believed; a side of its own each where `sides` are named."""
+    """Parameters within 30 % of the nominal values; separate values for the named `sides`."""
     rng = np.random.default_rng(seed)
     return {name + side: value * rng.uniform(0.7, 1.3) for name, value in BELIEVED.items() for side in sides}
 
@@ -27,7 +27,7 @@ def played(seed: int, R1: float = 0.038, R2: float = 0.022, motor: int = 1, alik
 
 
 @pytest.mark.parametrize("seed", [2, 3, 5])
-def test_unknown_values_within_30_percent_are_found_within_5(seed):
+def test_parameters_within_30_percent_are_identified_within_5_percent(seed):
     frf, truth = played(seed), unknown(seed)
     found = model_fit.fit(frf, frf_runs.config())
     both = {name + side: value for name, value in truth.items() for side in ("1", "2")}
@@ -41,7 +41,7 @@ def test_unknown_values_within_30_percent_are_found_within_5(seed):
     assert 0.5 < found.chi2 < 1.5
 
 
-def test_the_shipped_machine_has_the_process_gain_of_the_thesis():
+def test_fitted_process_gain_is_that_of_the_thesis():
     found = model_fit.fit(frf_runs.response().frf, frf_runs.config())
     assert found.K_p.value == pytest.approx(25.4, rel=0.03)
     assert found.K_p.unit == "rad/s^2/A"
@@ -49,20 +49,20 @@ def test_the_shipped_machine_has_the_process_gain_of_the_thesis():
     assert found.settings.parameters.c_m1 == found.parameters["c_m"].value
 
 
-def test_noise_finds_it_as_well():
+def test_fit_from_noise_excitation():
     found = model_fit.fit(sensitivity.identify(frf_runs.noise()).frf, frf_runs.config())
     for name, true in BELIEVED.items():
         assert found.parameters[name].value == pytest.approx(true, rel=0.05), name
 
 
-def test_without_the_drive_it_is_the_same_fit():
+def test_fit_does_not_depend_on_the_division_by_the_drive():
     frf, config = frf_runs.response().frf, frf_runs.config()
     one, two = model_fit.fit(frf, config), model_fit.fit(frf.without_drive(config), config)
     assert two.parameters["J_m"].value == pytest.approx(one.parameters["J_m"].value, rel=1e-5)
 
 
-def test_sides_that_differ_are_refused_and_then_told_apart():
-    """One name for both sides does not explain it; both motors at two pairs of radii carry all ten."""
+def test_different_sides_need_separate_parameters():
+    """Common parameters do not fit the data; both motors at two pairs of radii identify all ten."""
     truth = unknown(2, ("1", "2"))
     frfs = [played(2, R1, R2, motor, False) for R1, R2 in ((0.038, 0.022), (0.03, 0.03)) for motor in (1, 2)]
     with pytest.raises(NoAnswer, match=r"misfit is .* times the noise, worst from .* two sides are not alike"):
@@ -74,34 +74,34 @@ def test_sides_that_differ_are_refused_and_then_told_apart():
     assert sum(inside) >= 8
 
 
-def test_a_linear_drive_is_fitted_too():
+def test_linear_drive_is_fitted():
     hidden = {"J_m": 1.2e-6, "M": 1.4, "k_c": 8.6, "b_c": 7e-4}
     frf = best_linear.identify(frf_runs.play(frf_runs.config("ldu", plant__parameters=hidden))).frf
     found = model_fit.fit(frf, frf_runs.config("ldu"))
     for name, true in hidden.items():
         e = found.parameters[name]
         assert e.value == pytest.approx(true, rel=0.05), name
-        deviation = np.log(e.high / e.low) / 4  # about: one interval in twenty misses the truth
+        deviation = np.log(e.high / e.low) / 4  # one interval in twenty misses the truth
         assert abs(np.log(e.value / true)) < 3 * deviation, name
-    with pytest.raises(NoAnswer, match=r"k_s runs to|does not determine k_s"):  # its mode is at 2.1 kHz
+    with pytest.raises(NoAnswer, match=r"k_s runs to|does not determine k_s"):  # mode at 2.1 kHz
         model_fit.fit(frf, frf_runs.config("ldu"), free=(*hidden, "k_s", "b_s"))
 
 
-def test_a_linear_drive_whose_friction_turns_is_refused():
-    """Little damping and a light motor: the resonance swings further than the speed carries."""
+def test_linear_drive_with_reversing_friction_is_refused():
+    """Little damping and a light motor: the vibration speed exceeds the constant speed."""
     light = {"J_m": 7.8e-7, "M": 1.25, "k_c": 8.1, "b_c": 5.9e-4}
     with pytest.raises(NoAnswer, match="the machine reverses"):
         best_linear.identify(frf_runs.play(frf_runs.config("ldu", plant__parameters=light), realisations=2))
 
 
-def test_a_band_without_the_mode_does_not_carry_its_damping():
+def test_band_without_the_mode_does_not_identify_its_damping():
     with pytest.raises(NoAnswer, match=r"(does not determine|runs to|does not separate).*"):
         model_fit.fit(frf_runs.response().frf, frf_runs.config(), band=(0.4, 8.0))
     with pytest.raises(NoAnswer, match=r"\d lines of the response are accurate enough from 1 to 2 Hz"):
         model_fit.fit(frf_runs.response().frf, frf_runs.config(), band=(1.0, 2.0))
 
 
-def test_the_delay_can_be_given():
+def test_delay_can_be_given():
     found = model_fit.fit(frf_runs.response().frf, frf_runs.config(), tau=0.003)
     assert found.tau.value == 0.003 and found.correlation.shape == (5, 5)
 
@@ -114,12 +114,12 @@ def test_the_delay_can_be_given():
         ((), "at least one"),
     ],
 )
-def test_wrong_names(free, said):
+def test_invalid_parameter_names_are_refused(free, said):
     with pytest.raises(UserError, match=said):
         model_fit.fit(frf_runs.response().frf, frf_runs.config(), free=free)
 
 
-def test_a_response_of_another_machine():
+def test_response_of_another_machine_is_refused():
     with pytest.raises(UserError, match="must be of an ldu"):
         model_fit.fit(frf_runs.response().frf, frf_runs.config("ldu"))
     with pytest.raises(UserError, match="not for axis"):

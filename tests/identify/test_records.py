@@ -1,4 +1,4 @@
-"""A record is the same whether it comes from a run or from a bundle, and what cannot be used is said."""
+"""Records from runs and bundles: equality, and unusable records."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -26,16 +26,16 @@ def bundle(run: fused.Run, **case: Any) -> Bundle:
     return Bundle(columns, {"config": data, **case}, Path("there"), {})
 
 
-def test_a_run_and_its_bundle_are_the_same_record(run):
+def test_run_and_its_bundle_give_the_same_record(run):
     one, two = records.take(run), records.take(bundle(run))
     assert one.config == two.config and one.dt == two.dt == 0.002
     np.testing.assert_array_equal(one.position, two["capstan"])
-    assert len(one.t) < len(run.rows)  # rows before it ran are left out
+    assert len(one.t) < len(run.rows)  # rows before state `running` are omitted
     assert [r.source for r in records.take_all([one, bundle(run)])] == ["ivu", "there"]
     assert len(records.take_all(bundle(run))) == 1
 
 
-def test_both_legs_are_steady_and_nothing_else(run):
+def test_steady_intervals_are_exactly_both_legs(run):
     record = records.take(run)
     found = records.steady(record, 0.1)
     assert len(found) == 2
@@ -45,7 +45,7 @@ def test_both_legs_are_steady_and_nothing_else(run):
         assert (stretch.stop - stretch.start) * record.dt > 0.9
 
 
-def test_missing_rows_end_a_stretch(run):
+def test_missing_rows_end_an_interval(run):
     record = records.take(run)
     middle = records.steady(record, 0.1)[0]
     at = (middle.start + middle.stop) // 2
@@ -55,35 +55,35 @@ def test_missing_rows_end_a_stretch(run):
     assert len(records.steady(cut, 0.0)) == 3
 
 
-def test_a_machine_that_stands_has_no_stretch(run):
+def test_machine_at_rest_has_no_interval(run):
     record = records.take(run)
     still = replace(record, columns={**record.columns, "ref": np.zeros(len(record.t))})
     assert records.steady(still) == []
 
 
-def test_a_wrong_column_is_named(run):
+def test_invalid_column_is_named(run):
     with pytest.raises(UserError, match=r"no column 'capstn'; is it 'capstan'\?"):
         records.take(run)["capstn"]
 
 
-def test_a_foreign_bundle_is_refused(run):
+def test_foreign_bundle_is_refused(run):
     with pytest.raises(UserError, match=r"there/case\.json: no config"):
         records.take(bundle(run, config=None))
 
 
-def test_a_machine_that_never_ran():
+def test_record_without_running_rows_is_refused():
     with pytest.raises(NoAnswer, match="the machine never ran"):
         records.take(fused.run(frf_runs.config(), 0.1))
 
 
-def test_a_trip_is_named_with_its_time():
+def test_trip_error_names_its_time():
     blocked = frf_runs.config(plant__parameters__tau_F1=1.0, reference={"steps": [{"at": 0.2, "to": 3.0, "ramp": 1.0}]})
     record = records.take(fused.run(blocked, 4.0))
     with pytest.raises(NoAnswer, match=r"tripped, (following_error|encoder_frozen) at \d+\.\d+ s"):
         records.check(record, records.steady(record))
 
 
-def test_a_saturated_drive_is_named_with_its_time(run):
+def test_saturation_error_names_its_time(run):
     record = records.take(run)
     found = records.steady(record)
     at = found[0].start + 7
@@ -93,14 +93,14 @@ def test_a_saturated_drive_is_named_with_its_time(run):
         records.check(replace(record, columns={**record.columns, "u1": u1}), found)
 
 
-def test_a_loop_that_swings_from_limit_to_limit_is_told(run):
+def test_limit_cycle_between_the_output_limits_is_reported(run):
     record = records.take(run)
     u1 = 9.995 * np.sign(np.sin(0.3 * np.arange(len(record.t))))
     with pytest.raises(NoAnswer, match="an unstable loop oscillates like this"):
         records.check(replace(record, columns={**record.columns, "u1": u1}), records.steady(record))
 
 
-def test_a_machine_that_turns_back_is_told_with_its_time(run):
+def test_reversal_error_names_its_time(run):
     record = records.take(run)
     found = records.steady(record)
     speed = record["capstan_speed"].copy()
@@ -109,7 +109,7 @@ def test_a_machine_that_turns_back_is_told_with_its_time(run):
         records.check(replace(record, columns={**record.columns, "capstan_speed": speed}), found)
 
 
-def test_a_loop_that_runs_away_is_told(run):
+def test_diverging_loop_is_reported(run):
     record = records.take(run)
     found = records.steady(record)
     s = found[0]

@@ -1,4 +1,4 @@
-"""Reel radii: the emulator's come back within a percent, the plain ratio within what (5.3) says."""
+"""Reel radii: those of the emulator to within a percent; the plain ratio to within (5.3)."""
 
 import bench_runs as runs
 import numpy as np
@@ -14,7 +14,7 @@ R_C, PULSES = 0.0125, 209
 
 
 @pytest.mark.parametrize(("R1", "R2"), [(0.038, 0.022), (0.020, 0.040), (0.030, 0.030)])
-def test_radii_of_the_emulator(R1, R2):
+def test_radii_of_the_emulator_are_identified(R1, R2):
     config = runs.config("ivu", radius__R1=R1, radius__R2=R2, plant__parameters__R1=R1, plant__parameters__R2=R2)
     record = bench.play(rr.radius_config(config))
     ways = rr.reel_radii(record)
@@ -30,7 +30,7 @@ def test_radii_of_the_emulator(R1, R2):
 
 @settings(deadline=None, max_examples=60)
 @given(R=st.floats(0.02, 0.04), start=st.floats(0.0, 1.0), speed=st.floats(0.3, 1.5), way=st.sampled_from([-1, 1]))
-def test_edges_beat_the_plain_ratio(R, start, speed, way):
+def test_edge_estimate_is_more_accurate_than_the_plain_ratio(R, start, speed, way):
     phi = way * np.arange(0.0, 2.5, speed * 0.002)
     n = np.floor(np.abs(phi) * R_C / R * PULSES / (2 * np.pi) + start)
     one = rr.radius(phi, n, R_C, PULSES)
@@ -38,14 +38,14 @@ def test_edges_beat_the_plain_ratio(R, start, speed, way):
     assert abs(one.plain / R - 1) <= 1.05 * one.accuracy
 
 
-def test_accuracy_of_the_thesis():
+def test_accuracy_is_that_of_the_thesis():
     """5.1: 0.6 rad of reel 1 for 5 %, 24 mm or 1.9 rad of the capstan; 0.7 % for 500 increments."""
     assert rr.accuracy(209, 0.6) == pytest.approx(0.05, rel=0.01)
     assert rr.travel_for(0.05) == pytest.approx(1.9, abs=0.03)
     assert rr.accuracy(500, 1.9) == pytest.approx(0.007, abs=5e-4)
 
 
-def test_ways_end_where_it_turns():
+def test_one_way_intervals_end_at_reversals():
     phi = np.concatenate((np.linspace(0, 3, 500), np.linspace(3, 1, 400), np.linspace(1, 5, 600)))
     ways = rr.one_way(phi, 1e-3)
     assert [phi[b - 1] - phi[a] for a, b in ways] == pytest.approx([3, -2, 4], abs=0.02)
@@ -54,7 +54,7 @@ def test_ways_end_where_it_turns():
     assert rr.one_way(np.zeros(100), 1e-3) == []
 
 
-def test_a_short_way_is_refused():
+def test_short_travel_is_refused():
     n = 1000
     columns = {"capstan": np.linspace(0, 1, n), "reel1_counts": np.arange(n) // 90, "reel2_counts": np.arange(n) // 50}
     with pytest.raises(NoAnswer, match=r"longest way without reversal is 0\.20 rad; it takes 1\.9"):

@@ -1,4 +1,4 @@
-"""Encoder against scale: the printer of chapter 11 has its 0.36 mm over 600 mm and its 1.8 um."""
+"""Encoder against scale: printer of chapter 11 with 0.36 mm over 600 mm and 1.8 um."""
 
 import bench_runs as runs
 import numpy as np
@@ -11,7 +11,7 @@ from rtctl.identify import bench
 from rtctl.identify import scale_error as se
 
 
-def test_trend_of_the_printer():
+def test_scale_error_trend_of_the_printer():
     (one,) = se.passes(runs.played(se.scale_config, "ldu_printer", 0.602, 0.05), 0.6)
     trend = se.scale_error(one.x, one.e, 3e-3)
     assert one.speed == pytest.approx(0.05, rel=1e-3)
@@ -23,7 +23,7 @@ def test_trend_of_the_printer():
     assert trend.periodic == pytest.approx(np.sqrt((8**2 + 6**2 + 5.8**2) / 2) * 1e-6, rel=0.1)
 
 
-def test_a_radius_that_is_believed_right_has_no_trend():
+def test_correct_nominal_radius_has_no_trend():
     record = runs.played(believed, "ldu_printer")
     (one,) = se.passes(record, 0.6)
     trend = se.scale_error(one.x, one.e, record.config.sensors.R_c)
@@ -36,7 +36,7 @@ def believed(config):
 
 @settings(deadline=None, max_examples=50)
 @given(slope=st.floats(-1e-3, 1e-3), amplitude=st.floats(0, 1e-5), phase=st.floats(0, 6.28))
-def test_interval_holds_the_trend(slope, amplitude, phase):
+def test_confidence_interval_covers_the_trend(slope, amplitude, phase):
     x = np.linspace(0, 0.6, 3000)
     trend = se.scale_error(x, slope * x + amplitude * np.sin(2 * np.pi * x / 0.01885 + phase), 3e-3)
     assert abs(trend.slope - slope) <= trend.half + 1e-9

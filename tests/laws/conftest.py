@@ -16,7 +16,7 @@ def zero() -> Callable[[np.dtype], Any]:
 
 @pytest.fixture(scope="session")
 def record() -> Callable[[Any], Any]:
-    """The params as the running tick sees them: a record."""
+    """Parameters as the running tick reads them: a structured record."""
 
     def make(params: Any) -> Any:
         rows = np.zeros(1, record_dtype(params))

@@ -34,18 +34,18 @@ def shared(p, u_c, T1=T1, T2=T2):
         ("motor2", 1.0, (0.3, -0.8)),
     ],
 )
-def test_each_kind_moves_its_motors(kind, u_c, wanted):
+def test_allocation_kind_selects_the_motors_that_carry_the_command(kind, u_c, wanted):
     assert shared(BARE[kind], u_c) == pytest.approx(wanted)
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_no_command_is_tension_alone(kind):
+def test_zero_command_gives_the_tension_voltages(kind):
     assert shared(BARE[kind], 0.0) == shared(FLOORED[kind], 0.0) == (T1, T2)
 
 
 @settings(deadline=None)
 @given(st.floats(-10, 10))
-def test_pull_never_slackens_and_always_carries_the_whole_command(u_c):
+def test_pull_never_lowers_the_tension_and_carries_the_whole_command(u_c):
     u1, u2 = shared(BARE["pull"], u_c)
     assert u1 >= T1 and u2 >= T2
     assert (u1 - T1) - (u2 - T2) == pytest.approx(u_c, abs=1e-12)
@@ -53,7 +53,7 @@ def test_pull_never_slackens_and_always_carries_the_whole_command(u_c):
 
 @settings(deadline=None)
 @given(st.sampled_from(KINDS), st.floats(-10, 10))
-def test_floor_keeps_both_taut_and_only_adds_tension(kind, u_c):
+def test_floor_keeps_both_tapes_taut_and_adds_equal_tension(kind, u_c):
     u1, u2 = shared(FLOORED[kind], u_c)
     bare1, bare2 = shared(BARE[kind], u_c)
     assert u1 >= 0.5 * T1 - 1e-9 and u2 >= 0.5 * T2 - 1e-9
@@ -61,5 +61,5 @@ def test_floor_keeps_both_taut_and_only_adds_tension(kind, u_c):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_floor_is_harmless_without_tension(kind):
+def test_floor_without_tension_gives_finite_outputs(kind):
     assert np.all(np.isfinite(shared(FLOORED[kind], 1.0, 0.0, 0.0)))

@@ -14,7 +14,7 @@ def run(p, s, x):
     return np.array([biquad.step(p, s, float(xk)) for xk in x])
 
 
-def test_is_the_exchange_format_to_the_bit(zero, record):
+def test_biquad_is_bit_exact_with_the_exchange_format(zero, record):
     x = np.random.default_rng(2).standard_normal(200)
     y = np.zeros(200)
     for k in range(200):
@@ -27,7 +27,7 @@ def test_is_the_exchange_format_to_the_bit(zero, record):
 
 
 @pytest.mark.parametrize("f", [1.0, 10.0, 100.0])
-def test_bilinear_is_the_continuous_filter_well_below_nyquist(response, f):
+def test_bilinear_transform_matches_the_continuous_filter_below_nyquist(response, f):
     num, den = [3.0, 40.0], [1e-4, 0.02, 1.0]
     s = 2j * np.pi * f
     assert response(biquad.bilinear2(num, den, DT), f, DT) == pytest.approx(
@@ -37,20 +37,20 @@ def test_bilinear_is_the_continuous_filter_well_below_nyquist(response, f):
 
 @settings(deadline=None)
 @given(st.floats(1.0, 4900.0))
-def test_prewarping_makes_one_frequency_exact(f):
+def test_prewarping_is_exact_at_one_frequency(f):
     w = 2 * np.pi * f
     p = biquad.bilinear2([w * w], [1.0, 1.4 * w, w * w], DT, prewarp=w)
     z = np.exp(-1j * w * DT)
     assert (p.b0 + p.b1 * z + p.b2 * z * z) / (1 + p.a1 * z + p.a2 * z * z) == pytest.approx(1 / 1.4j, rel=1e-6)
 
 
-def test_first_order_has_no_cancelling_pair_at_nyquist():
+def test_first_order_section_has_no_cancelling_pair_at_nyquist():
     p = biquad.bilinear2([1.0], [0.01, 1.0], DT)
     assert p.b2 == p.a2 == 0.0
 
 
 @pytest.mark.parametrize("x", [0.0, 2.5, -1e3])
-def test_reset_is_a_steady_state(zero, x):
+def test_reset_biquad_is_in_steady_state(zero, x):
     s = zero(biquad.BIQUAD_STATE)
     y = biquad.reset(P, s, x)
     assert y == pytest.approx(sum(P[:3]) / (1 + P.a1 + P.a2) * x)
@@ -64,7 +64,7 @@ def test_reset_of_an_integrator_starts_at_zero(zero):
     assert biquad.step(p, s, 5.0) == pytest.approx(5.0 * DT)
 
 
-def test_refuses_what_cannot_be_built():
+def test_unstable_or_too_fast_biquad_is_refused():
     with pytest.raises(ValueError, match="unstable"):
         biquad.build(biquad.BiquadSettings(b0=1.0, a1=-2.1, a2=1.0), DT)
     with pytest.raises(ValueError, match="6000 Hz is not below half the sample rate of 10000 Hz"):

@@ -11,7 +11,7 @@ P = bumpless.build(bumpless.BumplessSettings(), DT)
 
 @settings(deadline=None)
 @given(st.floats(-10, 10), st.floats(-10, 10))
-def test_no_jump_at_a_change_and_the_new_output_in_the_end(before, after):
+def test_bumpless_transfer_has_no_jump_and_decays_to_the_new_output(before, after):
     s = np.zeros(1, bumpless.BUMPLESS_STATE)[0]
     assert bumpless.step(P, s, before, 0, before) == before
     u = [before, bumpless.step(P, s, after, 1, before)]
@@ -22,7 +22,7 @@ def test_no_jump_at_a_change_and_the_new_output_in_the_end(before, after):
     assert u[-1] == pytest.approx(after, abs=1e-3)
 
 
-def test_a_gain_change_of_the_pd_does_not_jump(zero):
+def test_gain_change_of_the_pd_law_is_bumpless(zero):
     low, high = (pd.build(pd.PdSettings(gain=g, tau_d=0.16), DT) for g in (3.0, 9.0))
     law, s = zero(pd.PD_STATE), zero(bumpless.BUMPLESS_STATE)
     u = []
@@ -33,7 +33,7 @@ def test_a_gain_change_of_the_pd_does_not_jump(zero):
     assert u[99] == pytest.approx(1.5)
 
 
-def test_reset_drops_the_offset(zero):
+def test_reset_clears_the_transfer_offset(zero):
     s = zero(bumpless.BUMPLESS_STATE)
     bumpless.step(P, s, 1.0, 1, 5.0)
     bumpless.reset(P, s)

@@ -9,7 +9,7 @@ P = observer.build(SETTINGS, DT)
 
 
 def held(push, ticks, share=1.0, known=0.0, delay=1):
-    """Position and command after `ticks` of a double integrator under PD that a force of `push` V pushes."""
+    """Position and observer state after `ticks` of a double integrator under PD with a disturbance of `push` V."""
     p = observer.build(SETTINGS.model_copy(update={"share": share, "delay": delay}), DT)
     s = np.zeros(1, observer.DISTURBANCE_OBSERVER_STATE)[0]
     x = v = u = 0.0
@@ -24,7 +24,7 @@ def held(push, ticks, share=1.0, known=0.0, delay=1):
     return x, s
 
 
-def test_estimates_a_constant_force_and_takes_it_off():
+def test_observer_estimates_and_cancels_a_constant_force():
     x, s = held(0.4, 3000)
     assert s["d"] / K == pytest.approx(0.4, rel=1e-6)
     assert abs(x) < 1e-8
@@ -32,18 +32,18 @@ def test_estimates_a_constant_force_and_takes_it_off():
 
 
 @pytest.mark.parametrize("delay", [0, 1, 3])
-def test_the_delay_of_the_command_is_followed(delay):
+def test_observer_accounts_for_the_command_delay(delay):
     _, s = held(0.4, 3000, delay=delay)
     assert s["d"] / K == pytest.approx(0.4, rel=1e-6)
 
 
-def test_a_force_that_a_feedforward_takes_is_not_compensated_twice():
+def test_force_cancelled_by_the_feedforward_is_not_compensated_twice():
     x, s = held(0.4, 3000, known=-0.4)
     assert s["d"] / K == pytest.approx(0.0, abs=1e-9)
     assert abs(x) < 1e-9
 
 
-def test_response_is_that_of_the_ticks():
+def test_analytic_response_to_the_position_matches_the_ticks():
     f = 3.0
     n = round(1 / (f * DT))
     y = np.exp(2j * np.pi * f * DT * np.arange(60 * n))
@@ -60,7 +60,7 @@ def test_response_is_that_of_the_ticks():
     assert -to_y[0] == pytest.approx(seen, rel=1e-3)
 
 
-def test_response_to_the_command_is_that_of_the_ticks():
+def test_analytic_response_to_the_command_matches_the_ticks():
     f = 3.0
     u = np.exp(2j * np.pi * f * DT * np.arange(20_000))
     outs = []
@@ -76,7 +76,7 @@ def test_response_to_the_command_is_that_of_the_ticks():
     assert observer.response(P, np.array([f]))[1][0] == pytest.approx(seen, rel=1e-3)
 
 
-def test_two_drives_may_pull_with_different_strength():
+def test_observer_accounts_for_different_gains_of_the_two_drives():
     settings = SETTINGS.model_copy(update={"acceleration_back": 0.5 * K, "delay": 0})
     p, s = observer.build(settings, DT), np.zeros(1, observer.DISTURBANCE_OBSERVER_STATE)[0]
     x = v = 0.0
@@ -89,11 +89,11 @@ def test_two_drives_may_pull_with_different_strength():
     assert abs(x) < 1e-8
 
 
-def test_the_drive_that_pulls_is_that_of_the_command_however_much_of_it_friction_takes():
+def test_observer_selects_the_drive_gain_by_the_sign_of_the_command():
     settings = SETTINGS.model_copy(update={"acceleration_back": 0.5 * K, "delay": 0})
     p, s = observer.build(settings, DT), np.zeros(1, observer.DISTURBANCE_OBSERVER_STATE)[0]
     x, v = 0.0, 1.0
-    for _ in range(400):  # it slows down under a command that is smaller than its friction of 0.4 V
+    for _ in range(400):  # decelerates: the command is smaller than the friction of 0.4 V
         observer.step(p, s, x)
         observer.track(p, s, 0.1, 0.4, 0.0)
         a = K * (0.1 - 0.4)
@@ -101,7 +101,7 @@ def test_the_drive_that_pulls_is_that_of_the_command_however_much_of_it_friction
     assert s["d"] == pytest.approx(0.0, abs=1e-2 * K)
 
 
-def test_what_accelerates_beside_the_command_is_no_disturbance():
+def test_known_acceleration_is_not_estimated_as_a_disturbance():
     p, s = (
         observer.build(SETTINGS.model_copy(update={"delay": 0}), DT),
         np.zeros(1, observer.DISTURBANCE_OBSERVER_STATE)[0],
@@ -115,8 +115,8 @@ def test_what_accelerates_beside_the_command_is_no_disturbance():
     assert s["d"] == pytest.approx(0.0, abs=1e-6 * K)
 
 
-def test_reset_forgets(zero):
+def test_reset_clears_the_observer_state(zero):
     _, s = held(0.4, 300)
     observer.reset(P, s)
     assert s["d"] == 0.0 and not s["a"].any()
-    assert observer.step(P, s, 3.0) == 0.0  # it starts from where the machine stands
+    assert observer.step(P, s, 3.0) == 0.0  # the reset observer starts at the present position

@@ -20,12 +20,12 @@ NOISE = {"kind": "noise", "rms": 0.5, "f_min": 1.0, "f_max": 100.0}
 MULTISINE = {"kind": "multisine", "rms": 0.5, "f_min": 1.0, "f_max": 100.0}
 
 
-def test_none_is_nothing():
+def test_excitation_none_is_zero():
     assert np.all(play(built(kind="none"), range(20)) == 0.0)
 
 
 @pytest.mark.parametrize("choices", [NOISE, MULTISINE])
-def test_rms_and_band_are_as_asked(choices):
+def test_excitation_has_the_requested_rms_and_band(choices):
     p = built(**choices)
     w = play(p, range(p.n))
     spectrum = np.abs(np.fft.rfft(w)) / p.n
@@ -44,7 +44,7 @@ def test_multisine_has_equal_odd_lines_only():
 
 
 @pytest.mark.parametrize("choices", [NOISE, MULTISINE, {"kind": "prbs", "amplitude": 1.0}])
-def test_seed_decides(choices):
+def test_seed_determines_the_excitation(choices):
     one, same, other = built(**choices), built(**choices), built(**choices, seed=2)
     assert np.array_equal(one.x, same.x)
     assert not np.array_equal(one.x, other.x)
@@ -61,14 +61,14 @@ def test_prbs_is_white_and_two_valued():
 
 
 @pytest.mark.parametrize("f", [1.0, 7.3, 0.123, 61.7])
-def test_sine_is_close_to_its_frequency_and_joins_up(f):
+def test_sine_has_its_frequency_and_repeats_without_a_step(f):
     p = built(kind="sine", amplitude=1.5, frequency=f)
     k = np.arange(min(p.n, 5000))
     assert p.amplitude * p.x[k] == pytest.approx(1.5 * np.sin(2 * np.pi * f * k * DT), abs=0.02)
     assert excitation.step(p, p.n) == excitation.step(p, 0)
 
 
-def test_plays_between_start_and_stop_only_and_repeats():
+def test_excitation_repeats_between_start_and_stop_only():
     p = built(**NOISE, start="0.1 s", stop="8.1 s")
     assert p.n == 2000
     ticks = play(p, [49, 50, 2050, 4049, 4050, 10**9])
@@ -77,7 +77,7 @@ def test_plays_between_start_and_stop_only_and_repeats():
     assert ticks[3] == 0.5 * p.x[1999]
 
 
-def test_running_tick_reads_it_from_a_record(record):
+def test_excitation_reads_its_parameters_from_a_record(record):
     p = built(**NOISE)
     assert excitation.step(record(p), 123) == excitation.step(p, 123)
 
@@ -92,6 +92,6 @@ def test_running_tick_reads_it_from_a_record(record):
         ({"kind": "sine", "amplitude": 1.0, "frequency": 250.0}, "250 Hz is not between"),
     ],
 )
-def test_refuses_what_the_rate_cannot_carry(choices, words):
+def test_excitation_that_does_not_fit_the_sample_rate_is_refused(choices, words):
     with pytest.raises(ValueError, match=words):
         built(**choices)

@@ -20,13 +20,13 @@ def factor(p, R1, R2, direction=1.0):
     return gain_schedule.step(p, np.zeros(1, gain_schedule.GAIN_SCHEDULE_STATE)[0], R1, R2, direction)
 
 
-def test_off_is_one():
+def test_gain_factor_is_one_when_off():
     assert factor(OFF, 0.04, 0.02) == 1.0
 
 
 @settings(deadline=None)
 @given(radius, radius)
-def test_model_keeps_the_loop_gain_at_its_design_value(R1, R2):
+def test_model_schedule_keeps_the_loop_gain_at_its_design_value(R1, R2):
     design = process_gain.step(MODEL.process, 0.038, 0.022)
     assert factor(MODEL, R1, R2, 1.0) * process_gain.step(MODEL.process, R1, R2) == pytest.approx(design)
     assert factor(MODEL, R1, R2, -1.0) * process_gain.step(MODEL.process, R2, R1) == pytest.approx(design)
@@ -34,14 +34,14 @@ def test_model_keeps_the_loop_gain_at_its_design_value(R1, R2):
 
 @settings(deadline=None)
 @given(radius, radius)
-def test_model_takes_no_gain_away(R1, R2):
+def test_model_schedule_with_default_floor_never_lowers_the_gain(R1, R2):
     p = built(mode="model")
     assert factor(p, R1, R2) == max(factor(MODEL, R1, R2), 1.0)
 
 
 @settings(deadline=None)
 @given(radius, radius)
-def test_both_driving_is_the_mean_of_the_two(R1, R2):
+def test_factor_for_both_drives_is_the_mean_of_both_directions(R1, R2):
     for p in (MODEL, MARGIN):
         mean = (factor(p, R1, R2, 1.0) + factor(p, R1, R2, -1.0)) / 2
         assert factor(p, R1, R2, 0.0) == pytest.approx(mean)
@@ -58,7 +58,7 @@ def test_both_driving_is_the_mean_of_the_two(R1, R2):
         (0.1, 0.0, 0.4),
     ],
 )
-def test_margin_interpolates_and_stays_within_the_table(R1, R2, wanted, record):
+def test_margin_schedule_interpolates_and_stays_within_the_table(R1, R2, wanted, record):
     assert factor(MARGIN, R1, R2) == pytest.approx(wanted)
     assert factor(record(MARGIN), R2, R1, -1.0) == pytest.approx(wanted)
 
@@ -72,6 +72,6 @@ def test_margin_interpolates_and_stays_within_the_table(R1, R2, wanted, record):
         ({**TABLE, "factor": [[1.0, 2.0], [3.0, -4.0], [0.4, 0.2]]}, "positive"),
     ],
 )
-def test_refuses_what_is_no_table(table, words):
+def test_invalid_schedule_table_is_refused(table, words):
     with pytest.raises(ValueError, match=words):
         built(mode="margin", table=table)

@@ -13,16 +13,16 @@ def volts(a, R1=0.038, R2=0.022, settings=SETTINGS):
     return s["u1"], s["u2"]
 
 
-def test_gives_each_reel_the_torque_that_its_inertia_takes():
+def test_feedforward_gives_each_reel_its_inertial_torque():
     u1, u2 = volts(10.0)
     torque_per_volt = 0.061 * 0.2
     assert u1 * torque_per_volt == pytest.approx(1.5e-3 * 10.0 * 0.0125 / 0.038)
     assert u2 * torque_per_volt == pytest.approx(-1.5e-3 * 10.0 * 0.0125 / 0.022)
 
 
-def test_turns_with_the_sign_of_the_acceleration():
+def test_feedforward_is_odd_in_the_acceleration():
     assert volts(-3.0) == tuple(-np.array(volts(3.0)))
 
 
-def test_a_share_of_zero_switches_it_off():
+def test_share_of_zero_switches_the_feedforward_off():
     assert volts(10.0, settings=SETTINGS.model_copy(update={"share": 0.0})) == (0.0, 0.0)

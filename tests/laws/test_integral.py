@@ -11,7 +11,7 @@ def s(zero):
     return zero(integral.INTEGRAL_STATE)
 
 
-def test_rests_within_the_dead_zone_and_grows_beyond_it_both_ways(s):
+def test_integral_holds_within_the_dead_zone_and_grows_beyond_it(s):
     assert integral.step(P, s, 0.009) == 0.0
     assert integral.step(P, s, -0.01) == 0.0
     for _ in range(100):
@@ -22,29 +22,29 @@ def test_rests_within_the_dead_zone_and_grows_beyond_it_both_ways(s):
     assert u == pytest.approx(-10.0 * 0.1 * 0.1)
 
 
-def test_no_jump_at_the_edge_of_the_dead_zone(s):
+def test_integral_has_no_jump_at_the_edge_of_the_dead_zone(s):
     assert integral.step(P, s, 0.01 + 1e-9) == pytest.approx(0.0, abs=1e-10)
 
 
-def test_does_not_wind_up_while_the_output_is_limited(s):
+def test_integral_does_not_wind_up_while_the_output_is_limited(s):
     for _ in range(5000):
         wanted = integral.step(P, s, 1.0)
         integral.track(P, s, wanted, min(wanted, 0.5))
-    assert s.i < 0.5 + 10.0 * 1.0 * 0.05 + 0.02  # limit, and what comes in within the tracking time
+    assert s.i < 0.5 + 10.0 * 1.0 * 0.05 + 0.02  # limit plus the growth within the tracking time
 
 
-def test_an_integral_without_gain_is_not_driven_by_the_limit(s):
+def test_anti_windup_does_not_drive_an_integral_without_gain(s):
     off = integral.build(integral.IntegralSettings(gain=0.0), DT)
     integral.track(off, s, 20.0, 10.0)
     assert integral.step(off, s, 1.0) == 0.0
 
 
-def test_a_tracking_time_below_the_tick_is_refused():
+def test_tracking_time_below_the_tick_is_refused():
     with pytest.raises(ValueError, match="shorter than the tick"):
         integral.build(integral.IntegralSettings(gain=1.0, tau_t=1e-4), DT)
 
 
-def test_reset_empties_it(s):
+def test_reset_clears_the_integral(s):
     integral.step(P, s, 1.0)
     integral.reset(P, s)
     assert s.i == 0.0

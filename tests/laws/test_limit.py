@@ -16,7 +16,7 @@ def run(p, s, u):
     return [limit.step(p, s, uk) for uk in u]
 
 
-def test_lets_through_what_fits_and_counts_what_does_not(zero):
+def test_limit_clips_the_output_and_counts_saturated_ticks(zero):
     s = zero(limit.LIMIT_STATE)
     assert run(P, s, [1.0, 3.0, 4.0, -9.0]) == [1.0, 3.0, 3.0, -2.0]
     assert (s.saturated, s.n_saturated) == (1, 2)
@@ -24,7 +24,7 @@ def test_lets_through_what_fits_and_counts_what_does_not(zero):
     assert (s.saturated, s.n_saturated) == (0, 2)
 
 
-def test_slew_starts_from_zero_and_from_what_reset_says(zero):
+def test_slew_limit_starts_from_zero_or_from_the_reset_value(zero):
     s = zero(limit.LIMIT_STATE)
     assert run(SLOW, s, [1.0, 1.0, -1.0]) == pytest.approx([0.1, 0.2, 0.1])
     limit.reset(SLOW, s, 2.0)
@@ -33,18 +33,18 @@ def test_slew_starts_from_zero_and_from_what_reset_says(zero):
 
 @settings(deadline=None)
 @given(st.lists(st.floats(allow_nan=True, allow_infinity=True), min_size=1, max_size=20))
-def test_never_passes_a_limit(u):
+def test_output_never_exceeds_the_limit_or_the_slew_rate(u):
     written = np.array([0.0, *run(SLOW, np.zeros(1, limit.LIMIT_STATE)[0], u)])
     assert np.all(np.abs(written) <= 3.0)
     assert np.all(np.abs(np.diff(written)) <= 0.1 + 1e-12)
 
 
-def test_not_a_number_is_zero_volts_and_counted(zero):
+def test_nan_command_becomes_zero_volts_and_is_counted(zero):
     s = zero(limit.LIMIT_STATE)
     assert run(P, s, [1.0, math.nan, 2.0]) == [1.0, 0.0, 2.0]
     assert (s.n_nan, s.n_saturated) == (1, 1)
 
 
-def test_refuses_limits_that_leave_nothing():
+def test_empty_output_range_is_refused():
     with pytest.raises(ValueError, match="lowest output 4 V is not below the highest 3 V"):
         limit.build(limit.LimitSettings(high=3.0, low=4.0), DT)

@@ -9,15 +9,15 @@ def of(**more):
 
 
 @pytest.mark.parametrize(("x", "u"), [(0.0, 0.0), (1.5, 2.5), (3.0, 2.0), (3.5, 1.0), (5.5, 2.5), (-0.5, 1.0)])
-def test_a_periodic_map_comes_back(x, u):
+def test_periodic_map_repeats(x, u):
     assert map_feedforward.step(of(), x, 0.0) == pytest.approx(u)
 
 
 @pytest.mark.parametrize(("x", "u"), [(10.0, 0.0), (10.0 + 2 / 3, 0.5), (14.0, 2.0), (99.0, 2.0), (-99.0, 0.0)])
-def test_a_map_of_places_is_held_beyond_its_ends(x, u):
+def test_non_periodic_map_is_held_beyond_its_ends(x, u):
     assert map_feedforward.step(of(periodic=False, start=10.0), x, 0.0) == pytest.approx(u)
 
 
-def test_it_is_read_ahead_by_the_speed():
+def test_map_is_read_ahead_by_lead_times_speed():
     p = of(lead=0.01)
     assert map_feedforward.step(p, 1.0, 50.0) == pytest.approx(map_feedforward.step(p, 1.5, 0.0))

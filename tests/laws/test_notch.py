@@ -14,7 +14,7 @@ def build(**changes):
 
 @settings(deadline=None)
 @given(st.floats(5.0, 4500.0), st.floats(0.0, 0.4))
-def test_gain_at_the_notch_is_the_ratio_of_dampings(f, zeta_z):
+def test_notch_gain_is_the_ratio_of_the_dampings(f, zeta_z):
     p = build(frequency=f, zeta_z=zeta_z)
     z = np.exp(-2j * np.pi * f * DT)
     gain = abs((p.b0 + p.b1 * z + p.b2 * z * z) / (1 + p.a1 * z + p.a2 * z * z))
@@ -27,13 +27,13 @@ def test_gain_is_one_far_from_the_notch(response):
 
 
 @pytest.mark.parametrize("f", [20.0, 100.0, 119.0, 150.0, 300.0])
-def test_is_the_continuous_one(response, f):
+def test_notch_matches_the_continuous_filter(response, f):
     s, w = 2j * np.pi * f, 2 * np.pi * 119.0
     wanted = (s**2 + 0.1 * w * s + w**2) / (s**2 + 1.0 * w * s + w**2)
     assert response(build(), f, DT) == pytest.approx(wanted, abs=5e-3)
 
 
-def test_refuses_a_peak_and_a_notch_above_nyquist():
+def test_peak_and_notch_above_nyquist_are_refused():
     with pytest.raises(ValueError, match="gain would rise"):
         build(zeta_z=0.6)
     with pytest.raises(ValueError, match="not below half the sample rate"):

@@ -9,7 +9,7 @@ P = pi_velocity.build(SETTINGS, DT)
 LIMIT = limit.build(limit.LimitSettings(high=3.0), DT)
 
 
-def test_each_part_has_its_sign(zero):
+def test_velocity_term_opposes_the_speed(zero):
     p = pi_velocity.build(pi_velocity.PiVelocitySettings(gain=1000.0, velocity_gain=20.0), DT)
     s = zero(pi_velocity.PI_VELOCITY_STATE)
     assert pi_velocity.step(p, s, 1e-3, 0.0) == pytest.approx(1.0)
@@ -17,7 +17,7 @@ def test_each_part_has_its_sign(zero):
     assert s.i == 0.0
 
 
-def test_integral_reaches_the_proportional_part_after_tau_i(zero):
+def test_integral_equals_the_proportional_part_after_tau_i(zero):
     s = zero(pi_velocity.PI_VELOCITY_STATE)
     for _ in range(50):
         u = pi_velocity.step(P, s, 1e-3, 0.0)
@@ -35,7 +35,7 @@ def held(s, ticks, track):
     return s.i
 
 
-def test_winds_up_without_tracking_and_settles_with_it(zero):
+def test_tracking_bounds_the_windup_of_the_integral(zero):
     wound = held(zero(pi_velocity.PI_VELOCITY_STATE), 1000, track=False)
     once, twice = (held(zero(pi_velocity.PI_VELOCITY_STATE), n, track=True) for n in (500, 1000))
     assert wound == pytest.approx(200.0)
@@ -44,7 +44,7 @@ def test_winds_up_without_tracking_and_settles_with_it(zero):
     assert P.tracking * (10.0 + twice + comes_in - 3.0) == pytest.approx(comes_in)
 
 
-def test_leaves_the_limit_soon_after_the_error_turns(zero):
+def test_output_leaves_the_limit_when_the_error_changes_sign(zero):
     s = zero(pi_velocity.PI_VELOCITY_STATE)
     held(s, 1000, track=True)
     assert pi_velocity.step(P, s, -1e-3, 0.0) < 3.0
@@ -52,7 +52,7 @@ def test_leaves_the_limit_soon_after_the_error_turns(zero):
     assert s.i == 0.0
 
 
-def test_tracking_does_nothing_where_nothing_was_cut(zero):
+def test_tracking_does_nothing_without_saturation(zero):
     s = zero(pi_velocity.PI_VELOCITY_STATE)
     u = pi_velocity.step(P, s, 1e-3, 0.0)
     before = s.i
@@ -60,6 +60,6 @@ def test_tracking_does_nothing_where_nothing_was_cut(zero):
     assert s.i == before
 
 
-def test_refuses_a_time_below_the_tick():
+def test_tracking_time_below_the_tick_is_refused():
     with pytest.raises(ValueError, match=r"tau_t 0\.0001 s is shorter than the tick"):
         pi_velocity.build(SETTINGS.model_copy(update={"tau_t": 1e-4}), DT)

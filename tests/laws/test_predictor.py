@@ -7,7 +7,7 @@ DT, K, N = 0.001, 80.0, 12
 P = predictor.build(predictor.PredictorSettings(delay=N, acceleration=K), DT)
 
 
-def test_says_where_a_double_integrator_will_be_when_the_command_of_now_acts():
+def test_predictor_gives_the_position_at_which_the_present_command_acts():
     rng = np.random.default_rng(3)
     s = np.zeros(1, predictor.PREDICTOR_STATE)[0]
     x, v, way, told = 0.2, -0.4, [0.0] * N, []
@@ -22,7 +22,7 @@ def test_says_where_a_double_integrator_will_be_when_the_command_of_now_acts():
     np.testing.assert_allclose(told[:-N], seen[N:], atol=1e-12)
 
 
-def test_a_loop_with_a_delay_that_rings_is_still_with_it():
+def test_predictor_stabilises_a_loop_with_a_delay():
     def most(predicts):
         s = np.zeros(1, predictor.PREDICTOR_STATE)[0]
         x, v, way, last = 1.0, 0.0, [0.0] * N, []
@@ -40,7 +40,7 @@ def test_a_loop_with_a_delay_that_rings_is_still_with_it():
     assert most(predicts=False) > 1e3
 
 
-def test_reset_forgets_what_is_on_its_way():
+def test_reset_clears_the_commands_in_transit():
     s = np.zeros(1, predictor.PREDICTOR_STATE)[0]
     predictor.track(P, s, 5.0)
     predictor.reset(P, s)

@@ -7,7 +7,7 @@ from rtctl.laws.reel_growth import ReelGrowthParams
 P = ReelGrowthParams(grow=0.5e-3 * 0.0125 / np.pi, core=0.01)
 
 
-def test_one_reel_winds_what_the_other_pays_out(zero):
+def test_one_reel_winds_the_tape_paid_out_by_the_other(zero):
     s = zero(reel_growth.REEL_GROWTH_STATE)
     reel_growth.start(s, 0.038, 0.022, 2.0)
     reel_growth.step(P, s, 2.0)
@@ -18,7 +18,7 @@ def test_one_reel_winds_what_the_other_pays_out(zero):
     assert np.pi * (0.022**2 - s.R2**2) == pytest.approx(tape * 0.5e-3)
 
 
-def test_an_empty_reel_has_the_radius_of_its_core(zero):
+def test_empty_reel_has_the_radius_of_its_core(zero):
     s = zero(reel_growth.REEL_GROWTH_STATE)
     reel_growth.start(s, 0.038, 0.022, 0.0)
     reel_growth.step(P, s, 1e4)

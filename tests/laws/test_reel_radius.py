@@ -1,4 +1,4 @@
-"""The procedure on a rigid tape with dry friction: m v' = tau1/R1 - tau2/R2 - friction."""
+"""Measurement of the reel radii on a rigid tape with dry friction: m v' = tau1/R1 - tau2/R2 - friction."""
 
 import numpy as np
 import pytest
@@ -23,7 +23,7 @@ P = built()
 
 
 class Unit:
-    """Two reels, a rigid tape and a capstan; offsets are where the sensors stand at the start."""
+    """Two reels, a rigid tape and a capstan; `offsets` are the initial phases of the reel sensors, in counts."""
 
     def __init__(self, R1, R2, offsets=(0.3, 0.6), stuck=False, dead=False):
         self.R = np.array([R1, R2])
@@ -65,19 +65,19 @@ def run(p, unit, limit=20_000):
 
 @settings(deadline=None, max_examples=8)
 @given(st.floats(0.02, 0.04), st.floats(0.02, 0.04), st.floats(0, 1), st.floats(0, 1))
-def test_finds_the_radii_within_one_percent(R1, R2, offset1, offset2):
+def test_radius_measurement_is_accurate_to_one_percent(R1, R2, offset1, offset2):
     s, _ = run(P, Unit(R1, R2, (offset1, offset2)))
     assert s.failed == 0
     assert radii(s) == pytest.approx((R1, R2), rel=0.01)
 
 
 @pytest.mark.parametrize(("R1", "R2"), [(0.04, 0.02), (0.02, 0.04), (0.03, 0.03)])
-def test_moves_gently_and_ends_at_rest_under_tension(R1, R2):
+def test_radius_measurement_is_smooth_and_ends_at_rest_under_tension(R1, R2):
     unit = Unit(R1, R2)
     s, trace = run(P, unit)
     u, v, x = trace[:, :2], trace[:, 2], trace[:, 3]
     assert np.abs(np.diff(u, axis=0)).max() < 0.05  # no jerk
-    assert u[200:].min() > 0.1  # the tape is never let go
+    assert u[200:].min() > 0.1  # the tape is never slack
     assert np.abs(v).max() / R_C < 6.0
     assert np.all(v[-100:] == 0.0)
     assert x.min() / R_C < -1.9  # motor 2 pulls first, then motor 1 winds back
@@ -85,7 +85,7 @@ def test_moves_gently_and_ends_at_rest_under_tension(R1, R2):
     assert (s.u1, s.u2) == pytest.approx((0.1 * R1 / 0.0122, 0.1 * R2 / 0.0122), rel=0.02)
 
 
-def test_one_way_only_ends_further_on():
+def test_one_way_measurement_ends_without_moving_back():
     s, trace = run(built(both_ways=False), Unit(0.03, 0.025))
     assert (s.failed, s.run) == (0, 1)
     assert radii(s) == pytest.approx((0.03, 0.025), rel=0.01)
@@ -93,7 +93,7 @@ def test_one_way_only_ends_further_on():
 
 
 @pytest.mark.parametrize("trouble", ["stuck", "dead"])
-def test_gives_up_after_the_timeout_with_the_drive_off(trouble):
+def test_radius_measurement_fails_at_the_timeout_with_the_drive_off(trouble):
     p = built(timeout=3.0)
     s, trace = run(p, Unit(0.03, 0.03, **{trouble: True}))
     assert s.failed == 1
@@ -101,7 +101,7 @@ def test_gives_up_after_the_timeout_with_the_drive_off(trouble):
     assert trace[:, :2].max() < p.T_max + p.u_step + 1.0
 
 
-def test_a_sensor_that_counts_twice_is_an_impossible_radius():
+def test_double_counts_of_a_sensor_fail_the_measurement():
     unit = Unit(0.03, 0.03)
     honest = unit.read
     unit.read = lambda: (honest()[0], 2 * honest()[1], honest()[2])
@@ -109,7 +109,7 @@ def test_a_sensor_that_counts_twice_is_an_impossible_radius():
     assert s.failed == 1
 
 
-def test_begins_the_count_again_where_the_tape_runs_back(zero):
+def test_edge_count_restarts_when_the_tape_runs_back(zero):
     s = zero(reel_radius.REEL_RADIUS_STATE)
     s.phase, s.direction = reel_radius.PULL, -1.0
     phi = np.concatenate([-0.004 * np.arange(100), -0.4 + 0.004 * np.arange(10)])
@@ -119,7 +119,7 @@ def test_begins_the_count_again_where_the_tape_runs_back(zero):
     assert s.reel1.seen == s.reel2.seen == 0
 
 
-def test_can_be_run_again():
+def test_radius_measurement_can_be_repeated():
     unit = Unit(0.035, 0.025)
     s, _ = run(P, unit)
     reel_radius.reset(P, s)
@@ -132,6 +132,6 @@ def test_can_be_run_again():
     assert radii(s) == pytest.approx((0.035, 0.025), rel=0.01)
 
 
-def test_refuses_a_travel_too_short_to_count_on():
+def test_travel_too_short_for_its_counts_is_refused():
     with pytest.raises(ValueError, match=r"by 1\.0 counts; take 0\.38 rad or more"):
         built(travel=0.1)

@@ -25,7 +25,7 @@ def setpoint(seq, target, rate):
     return np.array([(seq, target, rate)], reference.SETPOINT)[0]
 
 
-def test_plays_steps_and_ramps_at_their_ticks(zero, record):
+def test_reference_plays_steps_and_ramps_at_their_ticks(zero, record):
     r = run(P, zero(reference.REFERENCE_STATE), range(400))
     assert np.all(r[:50] == 0.0) and np.all(r[50:150] == 1.0)
     assert r[200] == pytest.approx(0.5)
@@ -35,20 +35,20 @@ def test_plays_steps_and_ramps_at_their_ticks(zero, record):
 
 @settings(deadline=None)
 @given(st.integers(1, 100_000))
-def test_a_step_comes_at_its_tick_whatever_the_rounding(k):
+def test_step_starts_at_its_tick_despite_rounded_times(k):
     p = built(knots=[(0.0, 0.0), (round(k * DT, 9), 0.0), (round(k * DT, 9), 1.0)])
     r = run(p, np.zeros(1, reference.REFERENCE_STATE)[0], [k - 1, k])
     assert list(r) == [0.0, 1.0]
 
 
-def test_repeats_to_the_bit(zero):
+def test_reference_repeats_bit_exact(zero):
     p = built(steps=STEPS, repeat="0.6 s")
     r = run(p, zero(reference.REFERENCE_STATE), range(900))
     assert np.array_equal(r[:300], r[300:600]) and np.array_equal(r[:300], r[600:])
     assert r.max() == 1.0
 
 
-def test_direction_is_the_last_change_and_held(zero):
+def test_reference_direction_is_the_sign_of_the_last_change(zero):
     s = zero(reference.REFERENCE_STATE)
     seen = []
     for k in range(400):
@@ -57,7 +57,7 @@ def test_direction_is_the_last_change_and_held(zero):
     assert (seen[49], seen[50], seen[149], seen[160], seen[399]) == (0, 1, 1, -1, -1)
 
 
-def test_arming_holds_the_position_and_playback_counts_from_there(zero):
+def test_arming_holds_the_position_and_relative_playback_starts_there(zero):
     s = zero(reference.REFERENCE_STATE)
     reference.hold(P, s, 7.0)
     assert list(run(P, s, range(100, 160))) == [7.0] * 60
@@ -66,14 +66,14 @@ def test_arming_holds_the_position_and_playback_counts_from_there(zero):
     assert r[0] == r[49] == 7.0 and r[50] == 8.0 and r[-1] == 7.0
 
 
-def test_absolute_values_do_not_count_from_there(zero):
+def test_absolute_playback_ignores_the_held_position(zero):
     p, s = built(steps=STEPS, relative=False), zero(reference.REFERENCE_STATE)
     reference.hold(p, s, 7.0)
     reference.start(p, s, 0)
     assert run(p, s, range(60))[-1] == 1.0
 
 
-def test_a_setpoint_ends_the_table_and_moves_at_its_rate(zero):
+def test_setpoint_ends_the_table_and_moves_at_its_rate(zero):
     s = zero(reference.REFERENCE_STATE)
     run(P, s, range(100))
     r = run(P, s, range(100, 700), setpoint(1, -1.0, 2.0))
@@ -82,7 +82,7 @@ def test_a_setpoint_ends_the_table_and_moves_at_its_rate(zero):
     assert run(P, s, [700], setpoint(2, 3.0, 0.0)) == 3.0
 
 
-def test_without_a_table_it_waits_for_setpoints(zero):
+def test_reference_without_a_table_waits_for_setpoints(zero):
     p, s = built(), zero(reference.REFERENCE_STATE)
     assert list(run(p, s, range(10))) == [0.0] * 10
     assert run(p, s, [10], setpoint(1, 0.25, 0.0)) == 0.25
@@ -99,12 +99,12 @@ def test_without_a_table_it_waits_for_setpoints(zero):
         ({"knots": [(1, 0), (0, 0)]}, "not fall"),
     ],
 )
-def test_refuses_tables_that_cannot_be_played(choices, words):
+def test_invalid_reference_table_is_refused(choices, words):
     with pytest.raises(ValueError, match=words):
         built(**choices)
 
 
-def test_units_follow_the_machine():
+def test_reference_units_follow_the_machine():
     metre = reference.MetreReferenceSettings(steps=[{"at": 0, "to": "2 mm", "ramp": "5 mm/s"}])
     assert metre.steps[0].to == pytest.approx(0.002)
     with pytest.raises(ValueError):

@@ -8,8 +8,10 @@ SETTINGS = repetitive.RepetitiveSettings(period=2 * np.pi, gain=40.0, slow=0.1)
 
 
 def turned(settings, turns, speed=3.0):
-    """Largest push that is left in the last turn, where a force comes back with the angle and the law sees what is left
-    of it as its error."""
+    """Largest residual disturbance in the last turn; the disturbance is periodic in the angle.
+
+    The error of the law is the residual disturbance. Also returns parameters and state of the law.
+    """
     p, s = repetitive.build(settings, DT), np.zeros(1, repetitive.REPETITIVE_STATE)[0]
     u, rest = 0.0, []
     for x in np.arange(0.0, turns * 2 * np.pi, speed * DT):
@@ -19,7 +21,7 @@ def turned(settings, turns, speed=3.0):
     return np.abs(rest[-round(2 * np.pi / speed / DT) :]).max(), p, s
 
 
-def test_what_comes_back_with_the_turn_is_learned_turn_by_turn():
+def test_disturbance_periodic_in_the_angle_is_learned_turn_by_turn():
     most = [turned(SETTINGS, n)[0] for n in (1, 3, 8)]
     assert most[0] > 0.3 > 0.25 > most[1] > 3 * most[2]
     assert most[2] < 0.05
@@ -31,12 +33,12 @@ def test_nothing_is_learned_at_rest():
         assert repetitive.step(p, s, 1.0, 0.05, 0.3) == 0.0
 
 
-def test_positions_below_zero_are_the_same_turn():
+def test_negative_positions_use_the_same_table():
     _, p, s = turned(SETTINGS, 4)
     assert repetitive.step(p, s, 1.0 - 6 * np.pi, 0.0, 0.0) == pytest.approx(repetitive.step(p, s, 1.0, 0.0, 0.0))
 
 
-def test_reset_forgets_the_table():
+def test_reset_clears_the_learned_table():
     _, p, s = turned(SETTINGS, 2)
     repetitive.reset(p, s)
     assert not s["w"].any()

@@ -21,11 +21,11 @@ def run(p, s, x):
 X = np.random.default_rng(3).standard_normal(100)
 
 
-def test_without_sections_nothing_changes(zero):
+def test_empty_cascade_passes_its_input(zero):
     assert np.array_equal(run(build(), zero(sections.SECTIONS_STATE), X), X)
 
 
-def test_cascade_is_one_section_after_the_other(zero, record):
+def test_cascade_applies_its_sections_in_order(zero, record):
     p = build(NOTCH, LOW_PASS)
     one, two = zero(biquad.BIQUAD_STATE), zero(biquad.BIQUAD_STATE)
     first = notch.build(notch.NotchSettings(**NOTCH), DT)
@@ -35,24 +35,24 @@ def test_cascade_is_one_section_after_the_other(zero, record):
     assert np.array_equal(run(record(p), zero(sections.SECTIONS_STATE), X), wanted)
 
 
-def test_a_list_of_five_numbers_is_a_section():
+def test_five_coefficients_are_a_section():
     raw = [392874.03618895734, -392245.3689983912, 0.0, -0.8817652051165021, 0.0]
     assert list(build(raw).first) == raw
 
 
-def test_starts_in_steady_state(zero):
+def test_reset_cascade_is_in_steady_state(zero):
     p, s = build(LEAD_LAG, NOTCH, NOTCH, LOW_PASS), zero(sections.SECTIONS_STATE)
     y = sections.reset(p, s, 1e-6)
     assert y == pytest.approx(0.17, rel=1e-6)
     assert run(p, s, [1e-6] * 10) == pytest.approx([y] * 10, rel=1e-6)
 
 
-def test_says_which_section_cannot_be_built():
+def test_error_names_the_invalid_section():
     with pytest.raises(ValueError, match=r"section 2 \(notch\): zeta_z 0.6 is not below"):
         build(LOW_PASS, {**NOTCH, "zeta_z": 0.6})
 
 
 @pytest.mark.parametrize("bad", [[[1.0, 2.0]], [{"kind": "notsch"}], [NOTCH] * 5, [{**NOTCH, "depth": 3}]])
-def test_refuses_what_is_no_section(bad):
+def test_invalid_section_is_refused(bad):
     with pytest.raises(ValidationError):
         sections.SectionsSettings(sections=bad)

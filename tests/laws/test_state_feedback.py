@@ -1,4 +1,4 @@
-"""State feedback from an observer: against its own transfer function, at rest, at the limit."""
+"""State feedback with an observer: transfer function, steady state, saturation."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ from rtctl.idiom import record_dtype
 from rtctl.laws import state_feedback as law
 
 DT = 0.01
-MASS = {  # a mass of 1 with a force of one unit of command, and the tick until it is written
+MASS = {  # unit mass, unit force per command, one tick of output delay
     "A": [[1.0, DT, DT**2 / 2], [0.0, 1.0, DT], [0.0, 0.0, 0.0]], "B": [0.0, 0.0, 1.0], "C": [1.0, 0.0, 0.0],
     "L": [0.3, 4.0, 0.0], "K": [20.0, 7.0, 0.1], "N": [1.0, 0.0, 0.0], "integral": 8.0, "tau_t": 0.5,
 }  # fmt: skip
@@ -23,7 +23,7 @@ def made(**changes):
 
 
 def run(ticks, ref, limit=np.inf, push=0.0):
-    """Positions (ticks,) and commands of a mass under the law, `push` beside the command."""
+    """Positions and commands (ticks,) of a mass under the law, with a disturbance `push`."""
     _, p, s = made()
     x = np.zeros(3)
     positions, commands = [], []
@@ -37,19 +37,19 @@ def run(ticks, ref, limit=np.inf, push=0.0):
     return np.array(positions), np.array(commands)
 
 
-def test_it_reaches_the_reference_and_stays():
+def test_state_feedback_reaches_the_reference_and_stays():
     x, u = run(6000, 1.0)
     assert x[-1] == pytest.approx(1.0, abs=1e-6)
     assert u[-1] == pytest.approx(0.0, abs=1e-6)
 
 
-def test_the_integral_holds_against_a_force():
+def test_integral_rejects_a_constant_force():
     x, u = run(4000, 1.0, push=-0.7)
     assert x[-1] == pytest.approx(1.0, abs=1e-4)
     assert u[-1] == pytest.approx(0.7, abs=1e-3)
 
 
-def test_a_limit_winds_up_neither_observer_nor_integral():
+def test_saturation_does_not_wind_up_the_observer_or_the_integral():
     free, _ = run(3000, 1.0)
     held, _ = run(3000, 1.0, limit=1.0)
     assert held.max() < 1.3 * max(free.max(), 1.0)
@@ -57,10 +57,10 @@ def test_a_limit_winds_up_neither_observer_nor_integral():
 
 
 @pytest.mark.parametrize("path", ["feedback", "reference"])
-def test_its_response_is_that_of_what_is_ticked(path):
+def test_analytic_response_matches_the_ticks(path):
     params, p, s = made()
     law.reset(p, s)
-    s["primed"] = 1  # from an estimate of 0, as a transfer function begins
+    s["primed"] = 1  # estimate of 0, the initial state of a transfer function
     count, out = 4096, []
     for k in range(count):
         signal = 1.0 if k == 0 else 0.0
@@ -75,7 +75,7 @@ def test_its_response_is_that_of_what_is_ticked(path):
     np.testing.assert_allclose(law.response(params, back, path), told, rtol=1e-5)
 
 
-def test_numbers_that_do_not_fit_together_are_told():
+def test_inconsistent_state_feedback_dimensions_are_refused():
     with pytest.raises(ValueError, match="L has 2 numbers, B has 3"):
         made(L=[0.1, 0.2])
     with pytest.raises(ValueError, match="A is 3 rows of 3 numbers"):

@@ -10,7 +10,7 @@ def volts(s):
     return s.V1, s.V2
 
 
-def test_voltage_is_that_of_the_torque(zero):
+def test_tension_voltage_gives_the_torque(zero):
     s = zero(tension.TENSION_STATE)
     for _ in range(60):
         tension.step(P, s, 0.04, 0.02)
@@ -18,7 +18,7 @@ def test_voltage_is_that_of_the_torque(zero):
     assert volts(s) == pytest.approx((full, full / 2))
 
 
-def test_grows_in_even_steps_after_arming(zero):
+def test_tension_grows_linearly_after_arming(zero):
     s = zero(tension.TENSION_STATE)
     full = 0.1 * 0.04 / (0.061 * 0.2)
     before = 0.0
@@ -32,7 +32,7 @@ def test_grows_in_even_steps_after_arming(zero):
     assert volts(s) == pytest.approx((full / 50, full / 100))
 
 
-def test_without_a_ramp_it_is_there_at_once(zero):
+def test_tension_without_a_ramp_starts_at_its_full_value(zero):
     s = zero(tension.TENSION_STATE)
     tension.step(tension.build(tension.TensionSettings(F_t=0.2, ramp=0.0), DT), s, 0.03, 0.03)
     assert s.V1 == s.V2 == pytest.approx(0.2 * 0.03 / (0.061 * 0.2))

@@ -10,7 +10,7 @@ def run(p, s, x):
     return np.array([velocity.step(p, s, float(xk)) for xk in x])
 
 
-def test_follows_a_ramp_in_the_end(zero):
+def test_velocity_of_a_ramp_converges_to_its_slope(zero):
     p = velocity.build(velocity.VelocitySettings(filter=20.0), DT)
     v = run(p, zero(velocity.VELOCITY_STATE), 5.0 + 3.0 * np.arange(300) * DT)
     assert v[0] == 0.0
@@ -18,19 +18,19 @@ def test_follows_a_ramp_in_the_end(zero):
     assert np.all(np.diff(v) >= -1e-9)
 
 
-def test_without_a_filter_it_is_the_difference(zero):
+def test_unfiltered_velocity_is_the_difference_quotient(zero):
     p = velocity.build(velocity.VelocitySettings(), DT)
     assert run(p, zero(velocity.VELOCITY_STATE), [1.0, 1.0, 1.01, 1.0]) == pytest.approx([0, 0, 5.0, -5.0])
 
 
-def test_one_count_moves_it_by_a_share_of_the_difference(zero):
+def test_filter_attenuates_the_velocity_step_of_one_count(zero):
     p = velocity.build(velocity.VelocitySettings(filter=10.0), DT)
     count = 2 * np.pi / 10_000
     v = run(p, zero(velocity.VELOCITY_STATE), np.where(np.arange(50) < 10, 0.0, count))
     assert v.max() == pytest.approx(p.a * count / DT)
 
 
-def test_reset_forgets_the_position(zero):
+def test_reset_clears_the_last_position(zero):
     p = velocity.build(velocity.VelocitySettings(filter=10.0), DT)
     s = zero(velocity.VELOCITY_STATE)
     run(p, s, [0.0, 1.0])

@@ -1,4 +1,4 @@
-"""A million ticks take no memory: what a call allocates does not depend on how long it runs."""
+"""The tick allocates no memory: allocations of a call do not depend on its number of ticks."""
 
 import gc
 import os
@@ -34,7 +34,9 @@ def during(counted: Callable[[], tuple[int, int]], call: Callable[[], Any]) -> t
     return after[0] - before[0], after[1] - before[1]
 
 
-def test_a_million_ticks(config: Callable[..., Any], bench: Callable[..., Any], counted: Callable[[], Any]) -> None:
+def test_a_million_ticks_allocate_no_memory(
+    config: Callable[..., Any], bench: Callable[..., Any], counted: Callable[[], Any]
+) -> None:
     steps = {"steps": [{"at": 0.2, "to": 1.0}, {"at": 1.2, "to": 0.0}], "repeat": 2.0}
     made = bench(config(set={"reference": steps, "safety.current_time": 0.0}), rows=1000)
     made.ask("arm", "play").run(2.0)
@@ -43,8 +45,8 @@ def test_a_million_ticks(config: Callable[..., Any], bench: Callable[..., Any], 
     memory = resident()
     million = during(counted, lambda: made.loop.stretch(made.ticks + 1, 1_000_000))
     assert million == one
-    assert resident() - memory < 64 * PAGE  # one byte a tick would be four times as much
-    assert made.status["state"] == 2  # it did run all the time
+    assert resident() - memory < 64 * PAGE  # one byte per tick would be four times as much
+    assert made.status["state"] == 2  # running until the end
 
 
 @njit
@@ -55,7 +57,7 @@ def allocate(times):
     return total
 
 
-def test_the_count_sees_an_allocation(counted: Callable[[], Any]) -> None:
+def test_allocation_counter_detects_an_allocation(counted: Callable[[], Any]) -> None:
     allocate(1)
     few, many = during(counted, lambda: allocate(1)), during(counted, lambda: allocate(100))
     assert many[0] - few[0] == many[1] - few[1] == 99

@@ -15,7 +15,7 @@ from rtctl.loop import generate
 
 @pytest.fixture
 def path(config: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Path]:
-    """Path of the module that a config makes, in an empty cache; nothing is compiled."""
+    """Path of the module generated from a config, in an empty cache; nothing is compiled."""
     monkeypatch.setenv("RTCTL_CACHE_DIR", str(tmp_path / "cache"))
 
     def make(kind: str = "ivu", link: str = "shm", **set_: Any) -> Path:
@@ -24,7 +24,7 @@ def path(config: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyP
     return make
 
 
-def test_the_same_config_makes_the_same_module(path: Callable[..., Path]) -> None:
+def test_same_config_generates_the_same_module(path: Callable[..., Path]) -> None:
     first = path()
     written = first.stat().st_mtime_ns
     assert path() == first and first.stat().st_mtime_ns == written
@@ -57,17 +57,17 @@ def test_parameters_do_not_recompile(path: Callable[..., Path], key: str, value:
         ("ldu", "law.position", {"kind": "pd", "gain": 1.0}),
     ],
 )
-def test_another_structure_is_another_module(path: Callable[..., Path], kind: str, key: str, value: Any) -> None:
+def test_structural_change_generates_another_module(path: Callable[..., Path], kind: str, key: str, value: Any) -> None:
     assert path(kind, **{key: value}) != path(kind)
 
 
-def test_each_machine_and_link_has_its_own(path: Callable[..., Path]) -> None:
+def test_each_machine_and_link_has_a_separate_module(path: Callable[..., Path]) -> None:
     made = {path(kind, link) for kind in machines.MODULES for link in ("zmq", "shm")}
     assert len(made) == 2 * len(machines.MODULES)
 
 
 @pytest.mark.parametrize("kind", machines.MODULES)
-def test_the_source_reads_in_the_order_of_the_diagram(config: Callable[..., Any], kind: str) -> None:
+def test_generated_source_follows_the_stages_of_the_diagram(config: Callable[..., Any], kind: str) -> None:
     machine = machines.build(config(kind))
     text = generate.source(machine, "shm")
     ast.parse(text)
@@ -80,7 +80,7 @@ def test_the_source_reads_in_the_order_of_the_diagram(config: Callable[..., Any]
         assert text.count(f"def {name}(") == 1, name
 
 
-def test_a_traced_state_field_becomes_a_column(config: Callable[..., Any], bench: Callable[..., Any]) -> None:
+def test_traced_state_field_becomes_a_column(config: Callable[..., Any], bench: Callable[..., Any]) -> None:
     machine = machines.build(config(set={"record.trace": ["position.d", "safety.silent"]}))
     text = generate.source(machine, "shm")
     assert "y.position_d = s.position.d" in text
@@ -89,7 +89,7 @@ def test_a_traced_state_field_becomes_a_column(config: Callable[..., Any], bench
     assert made.row.names == tuple(c.name for c in made.columns)
 
 
-def test_row_has_every_column_and_the_tick_is_a_whole_number(config: Callable[..., Any]) -> None:
+def test_row_has_every_column_and_an_integer_tick(config: Callable[..., Any]) -> None:
     made = generate.generate(machines.build(config()), "shm")
     assert made.row.names == tuple(c.name for c in made.columns) and len(set(made.row.names)) == len(made.columns)
     assert made.row["tick"] == np.int64
@@ -103,7 +103,7 @@ def fresh_hash() -> Any:
     sources.sources_hash.cache_clear()
 
 
-def test_a_changed_source_or_version_is_another_hash(fresh_hash: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_changed_source_or_version_changes_the_hash(fresh_hash: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     before = fresh_hash()
     fresh_hash.cache_clear()
     assert fresh_hash() == before and re.fullmatch("[0-9a-f]{64}", before)
@@ -118,7 +118,7 @@ def test_a_changed_source_or_version_is_another_hash(fresh_hash: Any, monkeypatc
     assert fresh_hash() != before
 
 
-def test_what_the_tick_does_not_hold_is_not_in_the_hash(fresh_hash: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_source_outside_the_tick_does_not_change_the_hash(fresh_hash: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     before = fresh_hash()
     read = Path.read_bytes
     fresh_hash.cache_clear()
@@ -126,7 +126,7 @@ def test_what_the_tick_does_not_hold_is_not_in_the_hash(fresh_hash: Any, monkeyp
     assert fresh_hash() == before
 
 
-def test_a_cache_that_cannot_be_written_is_told(
+def test_unwritable_cache_is_reported(
     config: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "file").write_text("")
@@ -136,11 +136,11 @@ def test_a_cache_that_cannot_be_written_is_told(
 
 
 @pytest.mark.parametrize("elsewhere", [False, True])
-def test_machine_code_is_found_where_numba_puts_it(
+def test_compiled_code_is_found_in_the_cache_folder_of_numba(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, elsewhere: bool
 ) -> None:
     monkeypatch.setenv("NUMBA_CACHE_DIR", folder := str(tmp_path / "numba") if elsewhere else "")
-    monkeypatch.setattr("numba.core.config.CACHE_DIR", folder)  # it reads the environment once
+    monkeypatch.setattr("numba.core.config.CACHE_DIR", folder)  # numba reads the environment once
     text = "import numba\n\n\n@numba.njit(cache=True)\ndef entry(x):\n    return x\n"
     path = tmp_path / f"small_{elsewhere}.py"
     path.write_text(text)
@@ -170,7 +170,7 @@ def test_one_process_at_a_time_compiles_an_entry_point(tmp_path: Path, monkeypat
     thread.join()
     assert order == ["first", "other"]
     with generate.turn(path, "entry"):
-        monkeypatch.setattr(generate, "PATIENCE", 0.0)  # as long as it waits for one that was stopped
+        monkeypatch.setattr(generate, "PATIENCE", 0.0)  # s, waiting time for a stopped process
         other()
     monkeypatch.setattr(generate, "is_warm", lambda *_: True)
     with generate.turn(path, "third"):

@@ -15,7 +15,7 @@ BOX = mailbox.mailbox_dtype(PARAMS)
 
 @tick
 def take_until(box, staged, p, c, last):
-    """Take as fast as it goes until the message numbered `last` has come; counts mixed messages."""
+    """Take messages in a busy loop until number `last` arrives; returns the number of torn messages."""
     mixed = 0
     while c[0].arm < last:
         if mailbox.take(box, staged, p, c) == 1:
@@ -56,7 +56,7 @@ def numbered(n: int) -> Any:
     return write
 
 
-def test_a_message_is_taken_once(two: Two) -> None:
+def test_message_is_taken_once(two: Two) -> None:
     assert two.take() == 0
     count = two.end.post(numbered(3))
     assert two.end.seen < count
@@ -65,14 +65,14 @@ def test_a_message_is_taken_once(two: Two) -> None:
     assert two.take() == 0
 
 
-def test_of_two_messages_the_newest_counts(two: Two) -> None:
+def test_newest_of_two_messages_is_taken(two: Two) -> None:
     two.end.post(numbered(1))
     two.end.post(numbered(2))
     assert two.take() == 1 and two.c["arm"] == 2
     assert two.take() == 0
 
 
-def test_a_message_that_is_being_written_waits(two: Two) -> None:
+def test_message_is_not_taken_while_it_is_written(two: Two) -> None:
     inside = []
 
     def write(params: Any, command: Any) -> None:
@@ -84,7 +84,7 @@ def test_a_message_that_is_being_written_waits(two: Two) -> None:
     assert two.take() == 1 and two.c["arm"] == 5
 
 
-def test_only_whole_messages_are_taken(two: Two) -> None:
+def test_torn_messages_are_never_taken(two: Two) -> None:
     last = 20_000
     found: list[int] = []
     two.end.post(numbered(0))

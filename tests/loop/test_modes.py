@@ -1,4 +1,4 @@
-"""The same machine, law and reference in every mode: on the wall clock, in turns with the plant's process, in one."""
+"""One machine, law and reference in every mode: real (wall clock), lockstep (two processes), fused (one process)."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -12,7 +12,7 @@ from rtctl.trace.bundle import load_bundle
 
 LENGTH = 7.0  # s
 STEPS = {"steps": [{"at": 0.5, "to": 1.0}, {"at": 2.5, "to": 0.0}, {"at": 4.5, "to": -1.0}]}
-SETTLED = [(2.0, 2.4), (4.0, 4.4), (6.0, 6.4)]  # s from the start of the reference: the ends of the steps
+SETTLED = [(2.0, 2.4), (4.0, 4.4), (6.0, 6.4)]  # s from the start of the reference: ends of the steps
 MODES = [("fused", "shm"), ("lockstep", "zmq"), ("lockstep", "shm")]
 
 Run = tuple[dict[str, Any], dict[str, np.ndarray]]
@@ -20,7 +20,7 @@ Run = tuple[dict[str, Any], dict[str, np.ndarray]]
 
 @pytest.fixture(scope="module")
 def run(runtime: Path, config: Callable[..., Any], tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Run]:
-    """`run("fused", "shm")`: what the run returned, and its trace."""
+    """`run("fused", "shm")`: result and trace of a run."""
 
     def make(mode: str, link: str, length: float = LENGTH, **keys: Any) -> Run:
         out = tmp_path_factory.mktemp("run") / "bundle"
@@ -46,14 +46,16 @@ def check_steps(trace: dict[str, np.ndarray], error: float) -> None:
 
 
 @pytest.mark.parametrize("key", MODES)
-def test_steps_end_within_a_hundredth_of_a_radian(runs: dict[tuple[str, str], Run], key: tuple[str, str]) -> None:
+def test_step_error_is_below_a_hundredth_of_a_radian_in_every_mode(
+    runs: dict[tuple[str, str], Run], key: tuple[str, str]
+) -> None:
     result, trace = runs[key]
     assert result["tripped"] is None and result["lost_counts"] == 0
     check_steps(trace, 0.010)
 
 
 @pytest.mark.parametrize("key", MODES)
-def test_the_tape_never_goes_slack(runs: dict[tuple[str, str], Run], key: tuple[str, str]) -> None:
+def test_tape_never_goes_slack(runs: dict[tuple[str, str], Run], key: tuple[str, str]) -> None:
     _, trace = runs[key]
     running = trace["state"] == 2
     assert running.mean() > 0.8
@@ -75,30 +77,28 @@ def differing(a: dict[str, np.ndarray], b: dict[str, np.ndarray]) -> list[str]:
 
 
 @pytest.mark.parametrize("key", MODES[1:])
-def test_turns_between_processes_are_to_the_bit_what_one_process_does(
-    runs: dict[tuple[str, str], Run], key: tuple[str, str]
-) -> None:
+def test_lockstep_is_bit_exact_with_fused(runs: dict[tuple[str, str], Run], key: tuple[str, str]) -> None:
     assert differing(runs[key][1], runs["fused", "shm"][1]) == []
 
 
-def test_the_same_seed_gives_the_same_bits_and_another_does_not(run: Callable[..., Run]) -> None:
-    """With dither on the reel sensors and radii measured through them, so that the noise reaches the law."""
+def test_run_is_bit_exact_for_one_seed_and_differs_for_another(run: Callable[..., Run]) -> None:
+    """Dither on the reel sensors reaches the law through the measured radii."""
     noisy = {"board.dither": True, "radius.source": "measured"}
     first, again, other = (run("fused", "shm", 8.0, **noisy, **{"loop.seed": seed})[1] for seed in (1, 1, 2))
     assert differing(first, again) == []
     assert differing(first, other) != []
 
 
-def test_rows_are_not_lost_where_the_ring_is_shorter_than_the_run(run: Callable[..., Run]) -> None:
+def test_no_rows_are_lost_when_the_ring_is_shorter_than_the_run(run: Callable[..., Run]) -> None:
     result, trace = run("fused", "shm", 20.0, **{"record.seconds": 2.0})
     assert result["rows"]["lost_in_ring"] == 0 and len(trace["tick"]) == 10_000
 
 
 @pytest.mark.realtime
 @pytest.mark.parametrize("link", ["zmq", "shm"])
-def test_on_the_wall_clock(run: Callable[..., Run], link: str) -> None:
+def test_real_mode_follows_steps_on_the_wall_clock(run: Callable[..., Run], link: str) -> None:
     off = {"link_timeout": 5.0, "missed_ticks": 0, "following_error": 0.0, "disagreement": 0.0}
-    off = {f"safety.{name}": value for name, value in off.items()}  # a busy test machine is no reason to trip
+    off = {f"safety.{name}": value for name, value in off.items()}  # no trip on a busy test machine
     result, trace = run("real", link, LENGTH, **off)
     assert result["tripped"] is None
     assert not trace["u1"][~np.isin(trace["state"], (1, 2))].any()

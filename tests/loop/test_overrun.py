@@ -1,4 +1,4 @@
-"""A loop that cannot hold its rate: late ticks are counted and left out, never made up for in a burst."""
+"""Overrun of the loop: late ticks are counted and skipped, never made up in a burst."""
 
 import signal
 from collections.abc import Callable
@@ -13,7 +13,7 @@ TICKS = 5000
 
 @pytest.fixture
 def loop(config: Callable[..., Any], bench: Callable[..., Any]) -> Callable[..., Any]:
-    """Run the real loop at a period in ns, idle and without a plant; returns its rows and its status."""
+    """Run the real loop with a period in ns, idle and without a plant; returns rows and status."""
 
     def run(period: int, ticks: int = TICKS, late: int = 0, spin: int = SPIN) -> tuple[np.ndarray, np.void]:
         made = bench(config(mode="real"))
@@ -26,25 +26,25 @@ def loop(config: Callable[..., Any], bench: Callable[..., Any]) -> Callable[...,
 
 
 def grid(rows: np.ndarray, period: int) -> np.ndarray:
-    """Number of the period that each tick was due in; checks that it was due at a whole one."""
+    """Index of the period in which each tick was due (n,); asserts due times on the grid of the period."""
     due = (rows["t"] - rows["lateness"]) * 1e9 / period
     assert np.allclose(due, np.round(due), atol=0.02)
     return np.round(due).astype(int)
 
 
 @pytest.mark.parametrize("period", [1_000, 20_000])
-def test_ticks_and_missed_ones_are_all_the_periods_that_went_by(loop: Callable[..., Any], period: int) -> None:
+def test_ticks_and_missed_ticks_add_up_to_the_elapsed_periods(loop: Callable[..., Any], period: int) -> None:
     rows, status = loop(period)
     due = grid(rows, period)
     skipped = np.floor(np.round(rows["lateness"] * 1e9) / period).astype(int)
     assert len(rows) == TICKS == status["tick"] == status["lateness"]["count"]
     assert due[0] == 0
-    assert (np.diff(due) == 1 + skipped[:-1]).all()  # the next tick is at the next whole period: no burst
+    assert (np.diff(due) == 1 + skipped[:-1]).all()  # no burst: the next tick is at the next full period
     assert status["missed"] == skipped.sum()
     assert due[-1] + 1 + skipped[-1] == TICKS + status["missed"]
 
 
-def test_a_period_that_is_far_too_short_is_seen(loop: Callable[..., Any]) -> None:
+def test_too_short_period_counts_missed_ticks_and_overruns(loop: Callable[..., Any]) -> None:
     rows, status = loop(1_000)
     assert status["missed"] > TICKS and status["overruns"] > 0
     assert status["late"] == np.count_nonzero(rows["lateness"] > 0)
@@ -57,7 +57,7 @@ def test_no_tick_is_early(loop: Callable[..., Any]) -> None:
     assert rows["period"][0] >= 0 and np.allclose(np.diff(rows["t"]), rows["period"][1:], atol=2e-9)
 
 
-def test_a_signal_that_cuts_a_sleep_short_brings_no_tick_early(loop: Callable[..., Any]) -> None:
+def test_signal_during_a_sleep_causes_no_early_tick(loop: Callable[..., Any]) -> None:
     before = signal.signal(signal.SIGALRM, lambda *_: None)
     signal.setitimer(signal.ITIMER_REAL, 1e-3, 0.3e-3)
     try:
@@ -69,15 +69,17 @@ def test_a_signal_that_cuts_a_sleep_short_brings_no_tick_early(loop: Callable[..
     grid(rows, 1_000_000)
 
 
-def test_late_is_counted_beyond_its_share_only(loop: Callable[..., Any]) -> None:
+def test_late_ticks_are_counted_beyond_the_late_threshold_only(loop: Callable[..., Any]) -> None:
     rows, status = loop(200_000, ticks=500, late=10**12)
     assert status["late"] == 0
     rows, status = loop(200_000, ticks=500, late=60_000)
     assert status["late"] == np.count_nonzero(np.round(rows["lateness"] * 1e9) > 60_000)
 
 
-def test_without_a_plant_outputs_end_at_zero(loop: Callable[..., Any], bench: Callable[..., Any]) -> None:
+def test_loop_without_a_plant_stays_idle_and_its_link_age_grows(
+    loop: Callable[..., Any], bench: Callable[..., Any]
+) -> None:
     rows, status = loop(100_000, ticks=10)
     assert status["ended"] == 1 and status["link_frames"] == 0
-    assert (np.diff(rows["link_age"]) >= 1).all()  # periods by the clock, those that went by without a tick too
+    assert (np.diff(rows["link_age"]) >= 1).all()  # periods of the clock, with the missed ones
     assert rows["link_age"][0] >= 1 and not rows["state"].any()

@@ -10,7 +10,7 @@ from rtctl.loop.realtime import RealTime
 
 
 class Kernel:
-    """Stands in for the kernel; refuses what is named in `refuses`."""
+    """Stub of the kernel; refuses the requests named in `refuses`."""
 
     def __init__(self, patch: pytest.MonkeyPatch):
         self.refuses: set[str] = set()
@@ -51,7 +51,7 @@ def kernel(monkeypatch: pytest.MonkeyPatch) -> Iterator[Kernel]:
         yield Kernel(patch)
 
 
-def test_asks_for_everything(kernel: Kernel) -> None:
+def test_real_time_setup_makes_all_requests(kernel: Kernel) -> None:
     made = RealTime(80, None)
     assert made.lacks == []
     assert kernel.asked["fifo"] == (os.SCHED_FIFO, 80)
@@ -71,18 +71,18 @@ def test_asks_for_everything(kernel: Kernel) -> None:
         ("latency", "no access to /dev/cpu_dma_latency", "write access"),
     ],
 )
-def test_names_what_was_refused_and_what_helps(kernel: Kernel, refused: str, what: str, remedy: str) -> None:
+def test_refused_request_is_named_with_its_remedy(kernel: Kernel, refused: str, what: str, remedy: str) -> None:
     kernel.refuses = {refused}
     (lack,) = RealTime(80, None).lacks
     assert lack.what == what and remedy in lack.remedy and str(lack).startswith(f"{what}: ")
 
 
-def test_names_all_that_was_refused(kernel: Kernel) -> None:
+def test_all_refused_requests_are_named(kernel: Kernel) -> None:
     kernel.refuses = {"fifo", "lock", "pin", "latency"}
     assert len(RealTime(80, 1).lacks) == 4
 
 
-def test_one_cpu_is_a_lack_unless_it_was_chosen(kernel: Kernel) -> None:
+def test_single_cpu_is_reported_unless_it_was_chosen(kernel: Kernel) -> None:
     kernel.cpus = {0}
     (lack,) = RealTime(80, None).lacks
     assert lack.what == "one CPU only"

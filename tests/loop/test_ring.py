@@ -9,7 +9,7 @@ from rtctl.idiom import tick
 from rtctl.loop import ring
 from rtctl.tick.memory import Segment
 
-ROW = np.dtype([("tick", np.int64), ("x", np.float64, (30,))], align=True)  # long, so that it can be torn
+ROW = np.dtype([("tick", np.int64), ("x", np.float64, (30,))], align=True)  # long enough to be torn
 CAPACITY = 8
 
 
@@ -37,9 +37,9 @@ class Two:
 
 @settings(deadline=None)
 @given(st.lists(st.tuples(st.integers(0, 3 * CAPACITY), st.one_of(st.none(), st.integers(0, 2 * CAPACITY)))))
-def test_rows_written_are_rows_read_and_rows_lost(tmp_path_factory, turns: list) -> None:
+def test_rows_written_equal_rows_read_plus_rows_lost(tmp_path_factory, turns: list) -> None:
     path = tmp_path_factory.getbasetemp() / "ring"
-    path.unlink(missing_ok=True)  # of the example before
+    path.unlink(missing_ok=True)  # file of the previous example
     two = Two(path)
     seen: list[int] = []
     gaps: list[int] = []
@@ -49,11 +49,11 @@ def test_rows_written_are_rows_read_and_rows_lost(tmp_path_factory, turns: list)
         assert most is None or len(rows) <= most
         seen += rows["tick"].tolist()
         gaps += [t for first, n in two.reader.gaps for t in range(first, first + n)]
-    assert sorted(seen + gaps) == list(range(two.written))  # each once: none twice, none unaccounted for
+    assert sorted(seen + gaps) == list(range(two.written))  # each row once: read or counted as lost
     assert seen == sorted(seen) and two.reader.lost == len(gaps)
 
 
-def test_the_newest_rows_survive_an_overflow(tmp_path: Path) -> None:
+def test_newest_rows_survive_an_overflow(tmp_path: Path) -> None:
     two = Two(tmp_path / "ring")
     two.put(3)
     two.reader.take()
@@ -64,13 +64,13 @@ def test_the_newest_rows_survive_an_overflow(tmp_path: Path) -> None:
     assert len(two.reader.take()) == 0 and two.reader.gaps == []
 
 
-def test_a_full_ring_without_overflow_loses_nothing(tmp_path: Path) -> None:
+def test_full_ring_without_overflow_loses_no_rows(tmp_path: Path) -> None:
     two = Two(tmp_path / "ring")
     two.put(CAPACITY - 1)
     assert two.reader.take()["tick"].tolist() == list(range(CAPACITY - 1)) and two.reader.lost == 0
 
 
-def test_rows_are_copies(tmp_path: Path) -> None:
+def test_taken_rows_are_copies(tmp_path: Path) -> None:
     two = Two(tmp_path / "ring")
     two.put(2)
     rows = two.reader.take()

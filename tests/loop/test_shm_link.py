@@ -41,14 +41,14 @@ def ends() -> Ends:
     return Ends()
 
 
-def test_a_frame_arrives_as_it_was_sent_and_once(ends: Ends) -> None:
+def test_shm_frame_arrives_unchanged_and_once(ends: Ends) -> None:
     assert ends.newest() == 0
     assert ends.send(7, t_ns=-(2**40), ao_codes=[-2048, 2047, 5, -5], dio_lines=0xFFFFFFFF, state=2)
     assert ends.newest() == 1 and ends.got.tobytes() == ends.tx.tobytes()
     assert ends.newest() == 0
 
 
-def test_the_newest_wins_and_nobody_waits_for_the_reader(ends: Ends) -> None:
+def test_newest_frame_is_received_and_the_sender_never_waits(ends: Ends) -> None:
     assert all(ends.send(seq) for seq in range(1000))
     assert ends.newest() == 1 and ends.got["seq"] == 999
 
@@ -62,7 +62,7 @@ def test_foreign_frames_are_ignored(ends: Ends, field: str, value: int) -> None:
     assert ends.newest() == 0 and ends.got.tobytes() == before
 
 
-def test_a_frame_that_is_being_written_is_left_alone(ends: Ends) -> None:
+def test_frame_is_not_received_while_it_is_written(ends: Ends) -> None:
     ends.send(1)
     ends.slot["count"] += 1
     assert ends.newest() == 0
@@ -70,8 +70,8 @@ def test_a_frame_that_is_being_written_is_left_alone(ends: Ends) -> None:
     assert ends.newest() == 1
 
 
-def test_the_count_may_wrap_around(ends: Ends) -> None:
-    """It is the futex's, so it has 32 bits: thirty hours at 10 kHz."""
+def test_frame_count_may_wrap_around(ends: Ends) -> None:
+    """The count is a futex word of 32 bits: thirty hours at 10 kHz."""
     ends.slot["count"] = ends.slot["seen"] = 2**31 - 6
     for seq in range(10):
         ends.send(seq)
@@ -82,7 +82,7 @@ def test_the_count_may_wrap_around(ends: Ends) -> None:
 
 @tick
 def ping(out, inp, tx, rx, staged, rounds):
-    """Send and wait for the answer; returns how many answers were right."""
+    """Send and wait for the reply; returns the number of correct replies."""
     right = 0
     for k in range(rounds):
         tx[0].seq = k
@@ -102,7 +102,7 @@ def pong(inp, out, rx, tx, staged, rounds):
         shm_link.send(out, tx)
 
 
-def test_whoever_waits_is_woken() -> None:
+def test_waiting_receiver_is_woken() -> None:
     outputs, inputs = np.zeros(1, shm_link.OUTPUTS_SLOT), np.zeros(1, shm_link.INPUTS_SLOT)
     loop, plant = generate.new_frames(), generate.new_frames()
     there = (outputs, inputs, loop["tx"], loop["rx"], loop["rx_staged"])
@@ -117,12 +117,12 @@ def test_whoever_waits_is_woken() -> None:
 
 
 @pytest.mark.parametrize("first", [True, False])
-def test_a_sender_that_was_interrupted_is_waited_for(ends: Ends, first: bool) -> None:
+def test_receiver_waits_for_an_interrupted_sender(ends: Ends, first: bool) -> None:
     if not first:
         ends.send(1)
         ends.wait()
     ends.tx["seq"] = 2
-    ends.slot["count"] += 1  # half a send; the other half comes later
+    ends.slot["count"] += 1  # interrupted send; `finish` completes the send
 
     def finish() -> None:
         ends.slot["frame"] = ends.tx
@@ -148,7 +148,7 @@ def write_many(slot, frame, count):
 
 @tick
 def read_many(slot, frame, staged, last):
-    """Newest frames until the last one has come; counts frames that mix two, or that are older than the one before."""
+    """Read newest frames until the last one; returns the number of torn or outdated frames."""
     wrong = 0
     before = 0
     while before < last:
@@ -175,18 +175,18 @@ def test_torn_frames_are_never_taken(ends: Ends) -> None:
     thread.join()
 
 
-def test_a_frame_that_is_there_is_not_waited_for(ends: Ends) -> None:
+def test_receiver_does_not_wait_for_an_available_frame(ends: Ends) -> None:
     ends.send(1)
     assert ends.wait() == 1 and ends.got["seq"] == 1
 
 
-def test_the_futex_of_each_architecture() -> None:
-    """Numbers of futex(2) by the kernel's own tables: arch/x86/entry/syscalls/syscall_64.tbl, asm-generic/unistd.h."""
+def test_futex_syscall_number_of_each_architecture() -> None:
+    """Numbers of futex(2) in the tables of the kernel: arch/x86/entry/syscalls/syscall_64.tbl, asm-generic/unistd.h."""
     assert shm_link.FUTEX == {"x86_64": 202, "aarch64": 98}
     assert shm_link.SYS_FUTEX == shm_link.FUTEX[platform.machine()]
 
 
 @pytest.mark.parametrize("machine, bits", [("riscv64", 64), ("armv7l", 32), ("aarch64", 32), ("i686", 32)])
-def test_a_processor_whose_futex_is_not_known_is_refused(machine: str, bits: int) -> None:
+def test_processor_without_a_known_futex_number_is_refused(machine: str, bits: int) -> None:
     with pytest.raises(UserError, match=f"{machine} with a {bits}-bit Python.*x86_64 and aarch64"):
         shm_link.check_architecture(machine, bits)

@@ -1,4 +1,4 @@
-"""Virtual time waits for whoever reads the ring; nothing is lost, however late the reader is."""
+"""Virtual time waits for the reader of the ring; a slow reader loses no rows."""
 
 import threading
 import time
@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 
-def test_a_slow_reader_holds_virtual_time_and_loses_nothing(
+def test_slow_reader_holds_virtual_time_and_loses_no_rows(
     config: Callable[..., Any], bench: Callable[..., Any]
 ) -> None:
     made = bench(config(), rows=1000)
@@ -19,7 +19,7 @@ def test_a_slow_reader_holds_virtual_time_and_loses_nothing(
     while thread.is_alive():
         before = int(made.segment["ring"][0]["head"])
         time.sleep(0.005)
-        if int(made.segment["ring"][0]["head"]) == before:  # it waits for us
+        if int(made.segment["ring"][0]["head"]) == before:  # the loop waits for the reader
             rows.append(made.reader.take())
     rows.append(made.reader.take())
     thread.join()
@@ -28,7 +28,7 @@ def test_a_slow_reader_holds_virtual_time_and_loses_nothing(
     assert made.status["ended"] == 1
 
 
-def test_a_stop_is_heard_while_it_waits(config: Callable[..., Any], bench: Callable[..., Any]) -> None:
+def test_loop_stops_while_it_waits_for_the_reader(config: Callable[..., Any], bench: Callable[..., Any]) -> None:
     made = bench(config(), rows=1000)
     thread = threading.Thread(target=made.loop.virtual, args=(10**6,))
     thread.start()

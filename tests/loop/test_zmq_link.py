@@ -48,13 +48,13 @@ def ends(request: pytest.FixtureRequest, tmp_path: Any) -> Iterator[Ends]:
     context.destroy(linger=0)
 
 
-def test_a_frame_arrives_as_it_was_sent(ends: Ends) -> None:
+def test_zmq_frame_arrives_unchanged(ends: Ends) -> None:
     assert ends.send(7, t_ns=-(2**40), ao_codes=[-2048, 2047, 5, -5], dio_lines=0xFFFFFFFF, state=2)
     assert ends.wait() == 1
     assert ends.got.tobytes() == ends.tx.tobytes()
 
 
-def test_the_newest_wins(ends: Ends) -> None:
+def test_newest_frame_is_received(ends: Ends) -> None:
     ends.send(1)
     ends.wait()
     for seq in (2, 3, 4):
@@ -85,8 +85,8 @@ def test_foreign_frames_are_ignored(ends: Ends, wrong: dict[str, int]) -> None:
 
 
 @pytest.mark.parametrize("length", [0, 1, frames.OUTPUTS.itemsize - 1, frames.OUTPUTS.itemsize + 1, 4096])
-def test_a_message_of_another_length_is_ignored(ends: Ends, length: int) -> None:
-    """Its start is that of the frame before, so that only the length tells it from a good one."""
+def test_message_of_wrong_length_is_ignored(ends: Ends, length: int) -> None:
+    """The message starts with a valid frame; only its length is wrong."""
     ends.send(1)
     ends.wait()
     good = ends.tx.copy()
@@ -98,7 +98,7 @@ def test_a_message_of_another_length_is_ignored(ends: Ends, length: int) -> None
 
 @tick
 def ping(socket, tx, rx, staged, rounds, pause):
-    """Send and take the answer, which has long come when it is looked for; returns the rounds that went well."""
+    """Send and receive a reply that has already arrived; returns the number of complete rounds."""
     for k in range(rounds):
         tx[0].seq = k
         if not zmq_link.send(socket, tx):
@@ -123,8 +123,8 @@ def pong(socket, rx, tx, staged, rounds):
 
 
 @pytest.mark.parametrize("pause", [0, 70_000])
-def test_no_frame_is_dropped_where_both_take_turns(ends: Ends, pause: int) -> None:
-    """A socket that never has to wait for a frame hears late that its queue is empty; lockstep would stand still."""
+def test_no_frame_is_dropped_in_lockstep(ends: Ends, pause: int) -> None:
+    """A socket that never waits for a frame learns late of an empty queue; lockstep would block."""
     loop, plant = generate.new_frames(), generate.new_frames()
     there = (ends.loop.underlying, loop["tx"], loop["rx"], loop["rx_staged"])
     back = (ends.plant.underlying, plant["tx"], plant["rx"], plant["tx_staged"])
@@ -144,12 +144,12 @@ def test_sending_never_waits_for_a_peer(tmp_path: Any) -> None:
     tx = generate.new_frames()["tx"]
     begun = time.monotonic()
     taken = [zmq_link.send(alone.underlying, tx) for _ in range(1000)]
-    assert time.monotonic() - begun < 2.0  # a thousand waits of a second would be more
+    assert time.monotonic() - begun < 2.0  # far less than a thousand waits of a second
     assert sum(taken) <= LINK_WAITING and not taken[-1]
     context.destroy(linger=0)
 
 
-def test_a_flood_does_not_hold_the_tick(ends: Ends) -> None:
+def test_flood_of_messages_does_not_delay_the_tick(ends: Ends) -> None:
     ends.send(1)
     ends.wait()
     stop = threading.Event()
@@ -168,6 +168,6 @@ def test_a_flood_does_not_hold_the_tick(ends: Ends) -> None:
         thread.join()
 
 
-def test_waiting_ends_with_the_sockets_timeout(ends: Ends) -> None:
+def test_wait_ends_at_the_socket_timeout(ends: Ends) -> None:
     ends.plant.set(zmq.RCVTIMEO, 20)
     assert ends.wait() == 0

@@ -1,4 +1,4 @@
-"""What sensors can tell apart: known null directions are found, and a sensor of force resolves them."""
+"""Identifiability by sensors: known null directions are found, and a force sensor resolves them."""
 
 import fused
 import numpy as np
@@ -12,7 +12,7 @@ def config(name, **changes):
     return fused.config(f"machines/{name}", **changes)
 
 
-def test_all_forces_may_be_larger_where_nothing_measures_one():
+def test_common_scale_of_all_forces_is_unidentifiable_without_a_force_sensor():
     found = sensitivity.sensitivity(config("axis"))
     (group,) = found.groups
     assert set(group.names) == {
@@ -23,7 +23,7 @@ def test_all_forces_may_be_larger_where_nothing_measures_one():
     assert any("larger by one factor" in line for line in sensitivity.sentences(found))
 
 
-def test_a_sensor_of_force_tells_the_scale():
+def test_force_sensor_identifies_the_common_scale():
     sensor = {"joint": "belt", "measures": "force", "column": "pull", "resolution": "0.1 N"}
     blind, seeing = (
         sensitivity.sensitivity(config("belt", **change)) for change in ({}, {"machine__sensors__cell": sensor})
@@ -32,12 +32,12 @@ def test_a_sensor_of_force_tells_the_scale():
     assert "joints.belt.stiffness" in seeing.told
 
 
-def test_factors_of_a_product_are_one():
+def test_factors_of_a_product_form_one_group():
     found = sensitivity.sensitivity(config("pendulum"))
     assert ("bodies.rod.gravity.mass", "bodies.rod.gravity.arm") in [group.names for group in found.groups]
 
 
-def test_what_moves_nothing_is_not_seen():
+def test_parameter_without_effect_is_unidentifiable():
     J = np.zeros((50, 3))
     J[:, 0], J[:, 1] = 100.0, np.linspace(-100, 100, 50)
     found = judged(["a.a", "a.b", "a.c"], J)

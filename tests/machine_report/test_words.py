@@ -1,4 +1,4 @@
-"""A description in words, in modes and as drawings."""
+"""Machine report: text, modes and drawings."""
 
 import xml.etree.ElementTree as ET
 
@@ -15,7 +15,7 @@ def machine(name, **changes):
     return fused.config(f"machines/{name}", **changes).machine
 
 
-def test_words_have_units_and_names():
+def test_report_text_has_units_and_names():
     lines = [line for _, line in words.sentences(machine("belt"))]
     assert lines[0] == "motor turns, 2.1e-05 kg m^2, dry friction 4 mNm, viscous friction 10 uNm s/rad"
     assert lines[2] == "belt is a spring from motor to carriage, ratio 12.7 mm/rad, 80 kN/m, damping 35 N s/m"
@@ -23,7 +23,7 @@ def test_words_have_units_and_names():
     assert lines[5] == "scale shows the position of carriage in scale_counts, one step is 10 um"
 
 
-def test_modes_are_those_of_two_masses_on_a_spring():
+def test_modes_of_two_masses_on_a_spring():
     J, m, k, r = 2.1e-5, 1.4, 8e4, 0.0127
     found = [mode for mode in modes.modes_of(machine("belt")) if mode.hertz]
     assert len(found) == 1
@@ -31,14 +31,14 @@ def test_modes_are_those_of_two_masses_on_a_spring():
     assert found[0].damping == pytest.approx(35 / 2 * np.sqrt((r * r / J + 1 / m) / k), rel=1e-2)
 
 
-def test_a_pendulum_hangs_or_falls():
+def test_pendulum_is_stable_hanging_and_unstable_upright():
     hanging = modes.modes_of(machine("arm"))[0]
     assert hanging.hertz == pytest.approx(np.sqrt(2.5 * 9.80665 * 0.25 / 0.65) / 2 / np.pi, rel=0.03)
     lines = modes.sentences(machine("arm", machine__bodies__arm__gravity__angle="180 deg"))
     assert any(line.startswith("falls away") for line in lines)
 
 
-def test_a_drive_has_modes_of_its_own():
+def test_drive_dynamics_add_modes():
     assert "400 Hz, damping 0.707: the drive" in modes.sentences(machine("screw"))
 
 
@@ -54,6 +54,6 @@ def test_both_drawings_show_every_element_once(name):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_no_two_bodies_have_one_place(name):
+def test_bodies_do_not_overlap_in_a_drawing(name):
     places = grid.grid(machine(name)).places
     assert len(set(places.values())) == len(places)

@@ -1,4 +1,4 @@
-"""Shipped configs in fused mode, each run once for all tests that look at it."""
+"""Runs of shipped configs in fused mode, cached for all tests."""
 
 import json
 from functools import lru_cache

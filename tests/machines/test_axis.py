@@ -19,7 +19,7 @@ def run() -> fused.Run:
     return fused.run(fused.config("axis", **SETPOINTS), 4.0)
 
 
-def test_it_follows_a_ramp_and_stands_where_it_was_told(run):
+def test_axis_follows_a_ramp_and_stops_at_the_target(run):
     assert run["trip"].max() == 0
     assert run["state"][-1] == safety.RUNNING
     for begin, target in ((1.5, 0.1), (3.5, 0.0)):
@@ -29,17 +29,17 @@ def test_it_follows_a_ramp_and_stands_where_it_was_told(run):
     assert speed.max() < 0.22
 
 
-def test_the_encoder_counts_micrometres(run):
+def test_axis_encoder_counts_micrometres(run):
     assert np.abs(run["x"] - run["truth_x"]).max() < 1.1e-6
     assert run["x"] == pytest.approx(run["x_counts"] * 1e-6, abs=1e-12)
 
 
-def test_dry_friction_keeps_an_error_of_less_than_its_volts(run):
-    """Without an integral the axis stops where the position gain no longer beats the friction."""
+def test_steady_state_error_is_bounded_by_friction_over_gain(run):
+    """Without an integral the axis stops where the proportional force equals the dry friction."""
     error = run.between(1.8, 2.0)["position_error"]
     assert np.abs(error).max() <= 20.4 / 35.15 / 39e3 + 2e-6
 
 
-def test_an_unknown_key_is_an_error():
+def test_unknown_key_is_an_error():
     with pytest.raises(UserError, match="gian"):
         fused.config("axis", law__position__gian=1.0)

@@ -1,4 +1,4 @@
-"""Compensation in the tick of every machine: its lines, and none where it is absent."""
+"""Lines of each compensation in the generated tick of every machine."""
 
 import ast
 
@@ -39,7 +39,7 @@ def config():
 
 @pytest.mark.parametrize("name", MACHINES)
 @pytest.mark.parametrize("kind", SETTINGS)
-def test_each_stands_in_the_tick_of_every_machine(name, kind, config):
+def test_each_compensation_adds_its_lines_to_the_tick_of_every_machine(name, kind, config):
     settings, line = SETTINGS[kind]
     plain = tick(config[name])
     made = tick(set_paths(config[name], {f"law.compensation.{kind}": settings}))
@@ -49,34 +49,34 @@ def test_each_stands_in_the_tick_of_every_machine(name, kind, config):
 
 
 @pytest.mark.parametrize("name", MACHINES)
-def test_all_of_them_stand_beside_one_another(name, config):
+def test_all_compensations_can_be_combined(name, config):
     every = {f"law.compensation.{kind}": settings for kind, (settings, _) in SETTINGS.items()}
     made = tick(set_paths(config[name], every))
     assert all(line in made for _, line in SETTINGS.values())
 
 
 @pytest.mark.parametrize("name", MACHINES)
-def test_outputs_that_come_on_reset_all_that_remembers(name, config):
+def test_arming_resets_every_compensation_with_state(name, config):
     every = {f"law.compensation.{kind}": settings for kind, (settings, _) in SETTINGS.items()}
     made = tick(set_paths(config[name], every))
     for module in ("model_feedforward", "integral", "disturbance_observer", "repetitive", "predictor", "sections"):
         assert f"{module}.reset" in made
 
 
-def test_anti_windup_sees_what_the_limit_sees(config):
+def test_anti_windup_tracks_the_command_before_the_limit(config):
     inverse = {"law.compensation.inverse": SETTINGS["inverse"][0], "law.compensation.integral": {"gain": 1.0}}
     made = tick(set_paths(config["belt"], inverse))
     assert "integral.track(p.integral, s.integral, asked, u)" in made
     assert "limit.step(p.limit, s.limit, asked)" in made
 
 
-def test_units_are_those_of_the_machine(config):
+def test_compensation_settings_use_the_units_of_the_machine(config):
     integral = {"gain": "2 V/mm/s", "dead_zone": "3 um"}
     found = set_paths(config["ldu"], {"law.compensation.integral": integral}).law.compensation.integral
     assert found.gain == pytest.approx(2000.0) and found.dead_zone == pytest.approx(3e-6)
 
 
-def test_an_effect_at_a_node_that_there_is_not_is_refused(config):
+def test_compensation_at_an_unknown_node_is_refused(config):
     effect = {"effect": {"term": "friction.coulomb", "node": "wheel", "F_C": 1.0}}
     with pytest.raises(Exception, match=r"effects\.0\.effect\.node: friction\.coulomb cannot stand at 'wheel'"):
         set_paths(config["belt"], {"law.compensation.feedforward": {"effects": [effect]}})

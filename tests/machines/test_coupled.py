@@ -1,4 +1,4 @@
-"""A machine with mechanics from a file closes its loop in one process and between processes, and replays."""
+"""Machine with mechanics from a file: closed loop in one process and in two, and replay."""
 
 import os
 
@@ -32,7 +32,7 @@ def bundle(run):
     return run("fused")
 
 
-def test_the_arm_follows_and_the_pendulum_swings(bundle):
+def test_arm_follows_the_reference_and_the_pendulum_swings(bundle):
     rows = load_bundle(bundle).columns
     assert rows["truth_arm"][-1] == pytest.approx(np.radians(60.0), abs=0.05)
     assert rows["truth_arm"].max() < 1.05 * np.radians(60.0)
@@ -41,10 +41,10 @@ def test_the_arm_follows_and_the_pendulum_swings(bundle):
     assert moved.max() <= 1.0
 
 
-def test_turns_between_processes_are_to_the_bit_what_one_process_does(run, bundle):
+def test_coupled_machine_in_lockstep_is_bit_exact_with_fused(run, bundle):
     one, other = (load_bundle(folder).columns for folder in (bundle, run("lockstep")))
     assert [name for name in one if not np.array_equal(one[name], other[name])] == []
 
 
-def test_it_replays_to_the_bit(bundle):
+def test_coupled_machine_replays_bit_exact(bundle):
     assert replay(bundle).identical

@@ -1,4 +1,4 @@
-"""Machines that a config describes: every example runs under its first law, in its own words and units."""
+"""Machines described in a config: every example runs with its starting law and its own names and units."""
 
 from pathlib import Path
 from typing import Any
@@ -37,21 +37,21 @@ def test_columns_have_the_names_and_units_of_the_description(belt):
     assert {"truth_motor", "truth_motor_speed", "truth_carriage", "truth_carriage_speed"} <= set(names)
 
 
-def test_the_belt_follows_its_reference(belt):
+def test_belt_axis_follows_its_reference(belt):
     assert not belt.tripped and belt["state"][-1] == safety.RUNNING
     at = belt.between(1.8, 1.99)
-    assert at["truth_motor"] == pytest.approx(12.0, abs=0.15)  # dry friction holds it a little short
+    assert at["truth_motor"] == pytest.approx(12.0, abs=0.15)  # steady-state error by dry friction
     assert at["truth_carriage"] == pytest.approx(0.0127 * at["truth_motor"], abs=1e-4)
 
 
-def test_counters_count_what_the_bodies_do(belt):
+def test_counters_agree_with_the_motion_of_the_bodies(belt):
     assert np.abs(belt["encoder_counts"] - belt["truth_motor"] * 8000 / (2 * np.pi)).max() <= 1.0
     assert np.abs(belt["scale_counts"] - belt["truth_carriage"] * 1e5).max() <= 1.0
     assert np.allclose(belt["feedback"], belt["encoder_counts"] * 2 * np.pi / 8000)
 
 
-def test_another_machine_of_the_same_structure_takes_the_same_tick():
-    """All numbers of a machine are in its params: a heavier carriage on a stiffer belt compiles nothing."""
+def test_machines_of_the_same_structure_share_the_compiled_tick():
+    """All numbers of a machine are parameters: another mass or stiffness does not recompile the tick."""
     one = machines.build(config("belt"))
     other = machines.build(
         config("belt", machine__bodies__carriage__mass="5 kg", machine__joints__belt__stiffness="200 N/mm")
@@ -61,7 +61,7 @@ def test_another_machine_of_the_same_structure_takes_the_same_tick():
     assert other.plant_diagram.blocks[0].params.inertia[1] == 5.0
 
 
-def test_speed_is_the_feedback_where_the_sensor_shows_one():
+def test_speed_sensor_makes_speed_the_feedback():
     settings = config("spindle")
     assert described.parts_of(settings).unit == "rad/s"
     assert settings.reference.steps[0].to == pytest.approx(1200 * 2 * np.pi / 60)
@@ -73,20 +73,20 @@ def test_speed_is_the_feedback_where_the_sensor_shows_one():
     assert np.array_equal(run["feedback"], run["speed"])
 
 
-def test_other_drives_get_their_share():
+def test_second_drive_gets_its_share_of_the_command():
     run = fused.run(config("two-motor", law__shares={"servo2": 0.5}), 1.4)
     moving = np.abs(run["amps1"]) > 0.5
     assert moving.sum() > 100
     assert run["amps2"][moving] == pytest.approx(0.5 * run["amps1"][moving], abs=2 * 8 / 2**15)
 
 
-def test_a_drive_that_pushes_backwards_is_turned_round():
+def test_drive_with_negative_gain_gets_a_negative_share():
     forward, backward = (machines.build(config("axis", machine__drives__drive__gain=g)) for g in (35.15, -35.15))
     shares = [next(b.params for b in m.diagram.blocks if b.name == "machine").shares[0] for m in (forward, backward)]
     assert shares == [1.0, -1.0]
 
 
-def test_a_term_stands_at_any_element():
+def test_physics_term_can_act_at_any_body_but_not_at_a_spring():
     physics = [{"term": "friction.viscous", "node": "carriage", "B": 40.0}]
     free, held = (fused.run(config("belt", plant__physics=p), 1.2) for p in ([], physics))
     assert not held.tripped
@@ -97,8 +97,8 @@ def test_a_term_stands_at_any_element():
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
-def test_half_the_step_changes_less_than_a_tenth_of_a_count(name):
-    """On three seconds of a smooth command for every drive, as strong as the reference of each takes."""
+def test_halving_the_integration_step_changes_less_than_a_tenth_of_a_count(name):
+    """Three seconds of a smooth command to every drive, scaled to the demand of its reference."""
     settings = config(name)
     machine = machines.build(settings)
     n = round(3.0 * machine.rate)
@@ -125,7 +125,7 @@ def test_every_example_is_stable_with_margins(name):
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
-def test_a_written_config_loads_to_the_same(name, tmp_path):
+def test_written_config_loads_unchanged(name, tmp_path):
     settings = config(name)
     path = tmp_path / "again.yaml"
     for full in (False, True):
@@ -133,7 +133,7 @@ def test_a_written_config_loads_to_the_same(name, tmp_path):
         assert load_config(str(path), []) == settings
 
 
-def test_numbers_of_the_description_are_settings_like_others():
+def test_numbers_of_the_description_are_settings():
     settings = config("belt")
     assert get_path(settings, "machine.bodies.carriage.mass") == 1.4
     with pytest.raises(UserError, match="did you mean 'carriage'"):
@@ -141,7 +141,7 @@ def test_numbers_of_the_description_are_settings_like_others():
     assert set_path(settings, "machine.bodies.carriage.mass", "2 kg").machine.bodies["carriage"].mass == 2.0
 
 
-def test_a_law_of_the_wrong_unit_is_refused(tmp_path: Path):
+def test_law_gain_with_the_wrong_unit_is_refused(tmp_path: Path):
     with pytest.raises(UserError, match=r"belt.yaml:\d+: law.position.gain: '4.55 V/rad' is not a quantity in V/m"):
         config("belt", law__feedback="scale")
 
@@ -160,7 +160,7 @@ BAD = {
 
 
 @pytest.mark.parametrize("old", BAD)
-def test_what_is_inconsistent_is_refused_with_file_and_line(old, tmp_path):
+def test_inconsistent_description_is_refused_with_file_and_line(old, tmp_path):
     text = (fused.CONFIGS / "machines" / "belt.yaml").read_text()
     new, words = BAD[old]
     path = tmp_path / "bad.yaml"
@@ -186,7 +186,7 @@ LOOPS = {
 
 
 @pytest.mark.parametrize("what", LOOPS)
-def test_a_machine_that_cannot_be_is_refused(what, tmp_path):
+def test_impossible_machine_is_refused_with_file_and_line(what, tmp_path):
     old, new, words = LOOPS[what]
     path = tmp_path / "bad.yaml"
     path.write_text((fused.CONFIGS / "machines" / "belt.yaml").read_text().replace(old, new, 1))
@@ -194,11 +194,11 @@ def test_a_machine_that_cannot_be_is_refused(what, tmp_path):
         load_config(str(path), [])
 
 
-def test_settings_come_back_from_plain_data():
+def test_settings_survive_a_round_trip_through_json_data():
     settings = config("gantry")
     again = machines.settings(settings.model_dump(mode="json", exclude_unset=True))
     assert again == settings and type(again) is type(settings)
 
 
-def test_the_schema_of_a_described_machine_has_its_parts():
+def test_schema_of_a_described_machine_has_its_parts():
     assert load_settings(fused.CONFIGS / "machines" / "belt.yaml", described.DescribedConfig, widen=machines.OWN)

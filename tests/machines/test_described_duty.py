@@ -1,4 +1,4 @@
-"""Ordinary use of a described machine, by its reference."""
+"""Nominal duty of a described machine, from its reference."""
 
 import pytest
 
@@ -12,7 +12,7 @@ def belt():
     return load_config("configs/machines/belt.yaml", [])
 
 
-def test_nodes_move_by_their_ratio(belt):
+def test_nominal_travel_of_a_node_scales_with_its_ratio(belt):
     found = duty(belt)
     assert (found.speed, found.travel) == (15.0, 12.0)
     carriage, motor = (found.use(node, belt) for node in ("carriage", "encoder"))
@@ -23,11 +23,11 @@ def test_nodes_move_by_their_ratio(belt):
     assert found.use("belt", belt).stiffness == 80e3
 
 
-def test_command_is_force_over_gain(belt):
+def test_nominal_command_is_force_over_gain(belt):
     found = duty(belt)
     assert found.volts(belt) == pytest.approx(found.use("motor", belt).force / 0.03)
 
 
-def test_a_config_without_a_reference_says_nothing_of_its_use(belt):
+def test_config_without_a_reference_has_no_nominal_duty(belt):
     with pytest.raises(ValueError, match="it does not move"):
         duty(set_paths(belt, {"reference": {}}))

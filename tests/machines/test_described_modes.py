@@ -1,4 +1,4 @@
-"""A described machine in every mode and over both links; its recording is a case of format 2 and replays."""
+"""Described machine in every mode and over both links; its bundle is a case of format 2 and replays."""
 
 import json
 import os
@@ -18,7 +18,7 @@ from rtctl.trace.bundle import load_bundle
 from rtctl.trace.replay import replay
 
 LENGTH = 1.6  # s
-OFF = {"safety__link_timeout": 5.0, "safety__missed_ticks": 0}  # a busy test machine is no reason to trip
+OFF = {"safety__link_timeout": 5.0, "safety__missed_ticks": 0}  # no trip on a busy test machine
 
 
 @pytest.fixture(scope="module")
@@ -39,14 +39,14 @@ def bundle(run: Callable[..., Path]) -> Path:
 
 
 @pytest.mark.parametrize("link", ["zmq", "shm"])
-def test_turns_between_processes_are_to_the_bit_what_one_process_does(run, bundle, link):
+def test_described_machine_in_lockstep_is_bit_exact_with_fused(run, bundle, link):
     one, other = (load_bundle(folder).columns for folder in (bundle, run("lockstep", link)))
     assert [name for name in one if not np.array_equal(one[name], other[name])] == []
 
 
 @pytest.mark.realtime
 @pytest.mark.parametrize("link", ["zmq", "shm"])
-def test_on_the_wall_clock(run, link):
+def test_described_machine_runs_in_real_mode(run, link):
     rows = load_bundle(run("real", link)).columns
     if np.diff(rows["tick"]).max() > 1 or rows["lateness"].max() > 0.05:
         pytest.skip("this machine is too busy to judge the loop by")
@@ -54,7 +54,7 @@ def test_on_the_wall_clock(run, link):
     assert rows["truth_motor"][-1] == pytest.approx(12.0, abs=0.5)
 
 
-def test_the_recording_is_a_case_of_format_2(bundle):
+def test_bundle_of_a_described_machine_is_a_case_of_format_2(bundle):
     case: dict[str, Any] = json.loads((bundle / "case.json").read_text())
     assert case["format"] == 2 and "plant" not in case and case["sample_rate"] == 1000.0
     described = Description.model_validate(case["machine"])
@@ -67,5 +67,5 @@ def test_the_recording_is_a_case_of_format_2(bundle):
     assert columns.units["feedback"] == "rad"
 
 
-def test_it_replays_to_the_bit(bundle):
+def test_described_machine_replays_bit_exact(bundle):
     assert replay(bundle).identical

@@ -1,4 +1,4 @@
-"""Block diagrams are whole: what is traced is written, what is held is used, what is used is held."""
+"""Block diagrams are consistent: every column is written, every block and module is declared and used."""
 
 import re
 from typing import Any
@@ -12,7 +12,7 @@ from rtctl.config.errors import UserError
 from rtctl.loop import generate
 from rtctl.machines.base import COMMON_COLUMNS
 
-LOOP_WRITES = {"tick", "t", "period", "lateness"}  # columns that the runner fills in
+LOOP_WRITES = {"tick", "t", "period", "lateness"}  # columns written by the runner
 MACHINES = ["ivu", "ldu", "axis"]
 
 
@@ -22,12 +22,12 @@ def machine(request: Any) -> machines.Machine:
 
 
 def lines(*stages: Any) -> str:
-    """Text of the stages' lines."""
+    """Text of the lines of all stages."""
     return "\n".join(line for stage in stages for _, body in stage for line in body)
 
 
 def source(machine: machines.Machine) -> str:
-    """Lines of the loop with the machine module's own functions, which its lines call."""
+    """Lines of the loop, and the functions of the machine module that the lines call."""
     import inspect
 
     return lines(machine.diagram.stages) + inspect.getsource(machines.MODULES[machine.kind])
@@ -42,12 +42,12 @@ def test_every_column_is_written(machine):
     assert tuple(machine.diagram.columns[: len(COMMON_COLUMNS)]) == COMMON_COLUMNS
 
 
-def test_every_column_has_words(machine):
+def test_every_column_has_a_help_text(machine):
     for column in (*machine.diagram.columns, *machine.truth):
         assert column.help and column.help.isascii()
 
 
-def test_every_truth_is_written(machine):
+def test_every_truth_column_is_written(machine):
     written = {
         int(i)
         for i in re.findall(
@@ -58,7 +58,7 @@ def test_every_truth_is_written(machine):
 
 
 @pytest.mark.parametrize("part", ["loop", "plant"])
-def test_every_block_is_used_and_every_use_is_a_block(machine, part):
+def test_every_block_is_used_and_every_used_block_exists(machine, part):
     diagram: Any = machine.diagram if part == "loop" else machine.plant_diagram
     if part == "loop":
         text = source(machine)
@@ -78,7 +78,7 @@ def test_every_block_is_used_and_every_use_is_a_block(machine, part):
     assert set(re.findall(r"\bs\.(\w+)", stages)) <= held[1]
 
 
-def test_every_module_is_used_and_every_use_is_a_module(machine):
+def test_every_module_is_used_and_every_used_module_exists(machine):
     for diagram, text in (
         (machine.diagram, lines(machine.diagram.stages)),
         (
@@ -90,7 +90,7 @@ def test_every_module_is_used_and_every_use_is_a_module(machine):
         assert called <= {module.rpartition(".")[2] for module in diagram.uses}
 
 
-def test_the_generated_tick_is_python(machine):
+def test_generated_tick_is_valid_python(machine):
     for link in ("zmq", "shm"):
         compile(generate.source(machine, link), machine.kind, "exec")
 
@@ -99,19 +99,19 @@ def test_the_generated_tick_is_python(machine):
     ("name", "node", "near"),
     [("ivu", "moter1", "motor1"), ("ldu", "carrage", "carriage"), ("axis", "cariage", "carriage")],
 )
-def test_a_term_at_an_unknown_node_is_refused_with_the_nearest(name, node, near):
+def test_unknown_node_error_suggests_the_nearest_name(name, node, near):
     with pytest.raises((UserError, ValidationError), match=f"did you mean '{near}'"):
         fused.config(name, plant__physics=[{"term": "friction.viscous", "node": node, "B": 0.1}])
 
 
-def test_a_node_of_another_plant_is_refused_with_what_there_is():
+def test_unknown_node_error_lists_the_nodes_of_the_plant():
     with pytest.raises((UserError, ValidationError), match="motor1, motor2, reel1"):
         fused.config("ivu", plant__physics=[{"term": "friction.viscous", "node": "x", "B": 0.1}])
 
 
 @pytest.mark.parametrize("name", MACHINES)
-def test_a_parameter_does_not_change_the_tick(name):
-    """So that another gain, another fit, never recompiles."""
+def test_parameter_change_does_not_change_the_tick(name):
+    """A change of a gain or of a fitted value never recompiles."""
     one = machines.build(fused.config(name))
     two = machines.build(fused.config(name, law__position__gain=1.0, safety__following_error=0.01))
     assert generate.source(one, "shm") == generate.source(two, "shm")

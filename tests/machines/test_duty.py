@@ -8,7 +8,7 @@ from rtctl.plants.physics import elements
 
 
 @pytest.mark.parametrize("kind", [kind for kind, profile in PROFILES.items() if profile.duty is not None])
-def test_every_node_has_a_use(kind):
+def test_nominal_duty_is_positive_at_every_node(kind):
     duty = PROFILES[kind].duty
     config = load_settings(find(kind), machines.CONFIGS[kind], [])
     for element in elements(kind):

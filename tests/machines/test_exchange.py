@@ -1,4 +1,4 @@
-"""Exchange format 1 as each machine declares it: symbols there and back, columns, the description that they fill."""
+"""Exchange format 1 of each machine: symbols in both directions, columns, and the machine description."""
 
 import pytest
 
@@ -13,7 +13,7 @@ DECLARED = {kind: profile.exchange for kind, profile in PROFILES.items() if prof
 
 
 @pytest.mark.parametrize("kind", DECLARED)
-def test_symbols_of_a_config_fill_the_description(kind):
+def test_symbols_of_a_config_fill_the_machine_description(kind):
     exchange = DECLARED[kind]
     found = exchange.symbols(load_settings(find(kind), machines.CONFIGS[kind], []).plant)
     machine = PLANTS[kind].described().layout.machine
@@ -29,13 +29,13 @@ def test_counters_are_columns_of_the_description(kind):
     assert set(DECLARED[kind].scales) <= columns
 
 
-def test_a_gear_ratio_makes_its_radius():
+def test_gear_ratio_determines_the_pulley_radius():
     exchange = DECLARED["ldu"]
     found = exchange.settings({"R_t": 0.03, "R_s": 0.0015, "N": 19.0})
     assert found["R_t"] / found["R_s"] == pytest.approx(19.0)
 
 
-def test_lines_of_an_encoder_are_counted_four_times_where_that_is_whole():
+def test_encoder_counts_become_lines_times_four_if_divisible():
     left = []
     assert lines(10000.0, "it", "sensors.it", left) == {"sensors.it": {"lines": 2500}} and left == []
     assert lines(10001.0, "it", "sensors.it", left) == {"sensors.it": {"lines": 10001, "multiply": 1}}

@@ -1,4 +1,4 @@
-"""The configs of the reel unit: how near its steps end, and the unit that it was before."""
+"""Step accuracy of the reel unit, and the old unit with its stepper motor."""
 
 import numpy as np
 import pytest
@@ -14,13 +14,13 @@ def test_steps_end_near_their_target(law, counts, most):
         assert not done.tripped and done.error < most and done.tension > -1e-9
 
 
-def test_full_hand_over_is_what_brings_it_there():
+def test_full_friction_hand_over_reduces_the_step_error():
     best, shipped = (accuracy09.outcome(law, 10000, 0.02, 0.04).error for law in ("best", "shipped"))
     assert best < 0.3 * shipped
 
 
-def test_the_old_unit_steps_in_open_loop():
-    """Its motor makes whole half steps, and the camera sees the tape and not the motor."""
+def test_old_reel_unit_steps_in_open_loop():
+    """The stepper moves in half steps; the camera measures the tape, not the motor."""
     run = play(config("ivu-old", {"reference": {"steps": [{"at": 0.5, "to": -0.5, "ramp": 1.6}]}}), 3.0)
     half = np.pi / 200
     asked = run["u"][run["state"] == run["state"][-1]] / half

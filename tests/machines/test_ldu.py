@@ -1,4 +1,4 @@
-"""The shipped linear drive, run fused: printing steps settle, and the present controller has the loop of the thesis."""
+"""Shipped linear drive in fused mode: settling of printing steps, and the loop gain of the thesis."""
 
 from typing import Any
 
@@ -21,8 +21,8 @@ def run() -> fused.Run:
 
 
 @pytest.mark.parametrize(("begin", "direction"), STEPS)
-def test_a_printing_step_settles(run, begin, direction):
-    """Within 5 % of the step after 0.16 s, without overshoot beyond that, and then at rest."""
+def test_printing_step_settles(run, begin, direction):
+    """The error is within 5 % of the step after 0.16 s, without larger overshoot; the carriage ends at rest."""
     rows = run.between(begin, begin + 0.4998)
     share = 1 + direction * (rows["truth_x"] - rows["target"][-1]) / STEP
     assert abs(share[0]) < 0.05
@@ -31,7 +31,7 @@ def test_a_printing_step_settles(run, begin, direction):
     assert np.ptp(rows["truth_x"][-500:]) < COUNT
 
 
-def test_nothing_trips_and_the_current_is_what_was_asked_for(run):
+def test_current_follows_the_command_without_a_trip(run):
     assert run["trip"].max() == 0
     assert run["state"][-1] == safety.RUNNING
     assert np.abs(run["u"]).max() < 3.0
@@ -40,14 +40,14 @@ def test_nothing_trips_and_the_current_is_what_was_asked_for(run):
 
 
 def test_encoder_and_scale_agree_with_the_carriage(run):
-    """x = R_c theta_c: the encoder differs by the capstan's twist, the scale by its pitch."""
+    """x = R_c theta_c: the encoder differs by the twist of the capstan, the scale by its pitch."""
     assert np.abs(run["scale"] - run["truth_x"]).max() < 1.1e-6
     assert np.abs(run["position"] - run["truth_x"]).max() < 4 * COUNT
     assert run["encoder_counts"] * COUNT == pytest.approx(run["position"], abs=1e-12)
 
 
-def test_truth_of_the_carriage_has_slip_and_guide_in_it():
-    """The scale reads where the carriage is, but for its pitch and for errors of its own."""
+def test_true_carriage_position_includes_slip_and_guide():
+    """The scale measures the carriage position to within its pitch and its periodic errors."""
     terms = [
         {"term": "transmission.slip", "node": "capstan", "F_max": 7.5},
         {"term": "ripple.capstan", "node": "capstan", "a": 2e-5},
@@ -65,7 +65,7 @@ def test_truth_of_the_carriage_has_slip_and_guide_in_it():
 
 
 def loop_response(config: Any, f: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Loop gain with both feedbacks open at the amplifier, and reference to encoder, from model and law."""
+    """Loop gain (both feedbacks open at the amplifier) and response from reference to encoder, by model and law."""
     machine = machines.build(config)
     plant = next(b.params for b in machine.plant_diagram.blocks if b.name == "plant")
     blocks = {b.name: b.params for b in machine.diagram.blocks}
@@ -73,7 +73,7 @@ def loop_response(config: Any, f: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     s, dt = 2j * np.pi * f, machine.dt
     P = np.array([np.linalg.solve(x * np.eye(ldu.NX) - A, B[:, 0])[ldu.ENCODER] for x in s]) * plant.R_c * 0.1
     back = np.exp(-s * dt)
-    hold = (1 - back) / (s * dt) * back  # and one tick until it is written
+    hold = (1 - back) / (s * dt) * back  # one tick of output delay
     a = blocks["velocity"].a
     velocity = a * (1 - back) / dt / (1 - (1 - a) * back)
     pi = blocks["position"].gain + blocks["position"].integral / (1 - back)
@@ -81,7 +81,7 @@ def loop_response(config: Any, f: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return L, P * hold * pi / (1 + L)
 
 
-def test_present_controller_has_the_bandwidth_and_the_margin_of_the_thesis():
+def test_loop_has_the_bandwidth_and_gain_margin_of_the_thesis():
     """12.7: approximately 8 Hz, and a gain margin of only 2 dB, at the first resonance."""
     f = np.geomspace(1.0, 1000.0, 6000)
     L, T = loop_response(fused.config("ldu", "print_steps"), f)
@@ -93,7 +93,7 @@ def test_present_controller_has_the_bandwidth_and_the_margin_of_the_thesis():
     assert -20 * np.log10(abs(L[worst])) == pytest.approx(2.0, abs=0.3)
 
 
-def test_bandwidth_shows_in_the_running_machine():
+def test_simulated_step_has_the_bandwidth_of_the_model():
     """A step without shaping and friction, against the step response of the model."""
     config = fused.config(
         "ldu", "print_steps", law__shaper__bandwidth=None, plant__parameters__F_c=0.0, law__friction__F_c=0.0

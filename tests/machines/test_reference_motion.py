@@ -1,4 +1,4 @@
-"""Motion along the reference: shape, forces and deflection, by hand for machines whose numbers are known."""
+"""Motion along the reference: mode shape, forces and deflection, compared with hand calculations."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ def of(path, changes=None):
 BELT = "configs/machines/belt.yaml"
 
 
-def test_a_free_machine_moves_rigidly():
+def test_unconstrained_machine_moves_rigidly():
     made = motion(of(BELT))
     np.testing.assert_allclose(made.phi, [1.0, 12.7e-3], rtol=1e-9)
     assert made.phi @ (made.M * made.phi) == pytest.approx(0.21e-4 + 1.4 * 12.7e-3**2)
@@ -33,14 +33,14 @@ def test_tape_moves_both_reels_by_their_radii():
     assert made.phi @ made.minus == pytest.approx(0.2 * 0.061 * 12.5 / 22, rel=1e-6)
 
 
-def test_the_carriage_of_the_linear_drive_is_in_metres():
+def test_carriage_of_the_linear_drive_moves_in_metres():
     mechanics = of("ldu")
     made = motion(mechanics)
     assert made.phi @ made.plus == pytest.approx(14.0, rel=1e-3)  # N/V, thesis 12.3
     assert mechanics.k_v == 172.0
 
 
-def test_a_spring_to_the_frame_bends_the_softest_way():
+def test_machine_with_a_spring_to_the_frame_has_a_finite_mode_shape():
     made = motion(of("configs/machines/torsion.yaml"))
     assert np.all(np.isfinite(made.phi))
     assert made.phi @ made.K @ made.phi >= 0.0
@@ -49,15 +49,15 @@ def test_a_spring_to_the_frame_bends_the_softest_way():
 def test_deflection_is_force_over_stiffness():
     mechanics = of(BELT)
     p = params(mechanics, ModelFeedforwardSettings(through="carriage"), 1e-3)
-    force = np.array([0.0, -5.0])  # N at the carriage, held by the drive at the motor
+    force = np.array([0.0, -5.0])  # N at the carriage, balanced by the drive at the motor
     total = force + np.array([5.0 * 12.7e-3, 0.0])
-    assert p.shift[:2] @ total == pytest.approx(5.0 / 80e3 / 12.7e-3, rel=1e-6)  # rad that the motor runs ahead
+    assert p.shift[:2] @ total == pytest.approx(5.0 / 80e3 / 12.7e-3, rel=1e-6)  # rad, lead of the motor
 
 
-def test_without_a_body_nothing_runs_ahead():
+def test_no_deflection_shift_without_a_body():
     assert not params(of(BELT), ModelFeedforwardSettings(), 1e-3).shift.any()
 
 
-def test_a_file_of_mechanics_has_none():
+def test_mechanics_file_has_no_reference_motion():
     with pytest.raises(ValueError, match=r"machine\.mechanics is a file"):
         of("configs/machines/furuta.yaml")

@@ -13,7 +13,7 @@ def is_ours(line: str) -> bool:
     return line.split()[0] == "rtctl"
 
 
-def test_every_command_is_there():
+def test_every_command_is_in_the_manual():
     assert {c.words[1] for c in ALL if len(c.words) > 1} == set(COMMANDS)
 
 
@@ -21,14 +21,14 @@ def test_every_command_is_there():
 def test_every_command_is_described(command):
     assert command.text and all(command.text)
     assert [p.names for p in command.parameters if not p.help] == []
-    assert [p.names for p in command.parameters if p.value == "VALUE"] == []  # says what is to stand there
+    assert [p.names for p in command.parameters if p.value == "VALUE"] == []  # names its value
     if not command.group:
         assert command.examples
     called = [parse(part) for example in command.examples for part in re.split(r" && | \| ", example) if is_ours(part)]
     assert command.group or command.words in called
 
 
-def test_page():
+def test_page_of_commands():
     text = command_pages()["commands.md"]
     assert "## rtctl run { #rtctl-run }" in text and "### rtctl campaign run { #rtctl-campaign-run }" in text
     assert "rtctl run [OPTIONS] CONFIG" in text
@@ -38,6 +38,6 @@ def test_page():
             assert [name for name in parameter.names if f"`{name}`" not in text] == []
 
 
-def test_text_that_markdown_would_take_for_something_else():
+def test_markdown_characters_are_escaped():
     assert prose("a < b, `c < d`") == "a &lt; b, `c < d`"
     assert cell("a | b\n c") == "a \\| b c"

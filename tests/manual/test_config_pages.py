@@ -25,7 +25,7 @@ def test_every_key_is_on_a_page(kind):
             assert f"| `{key}` |" in text
 
 
-def test_a_row_has_all_that_is_known():
+def test_row_of_a_setting_has_type_unit_default_and_help():
     line = next(line for line in PAGES["config_ivu.md"].splitlines() if line.startswith("| `tau_d` |"))
     row = next(row for row in settings_table(CONFIGS["ivu"]) if row.path == "law.position.tau_d")
     assert [part.strip() for part in line.strip("|").split("|")] == ["`tau_d`", "number", "s", *line.split("|")[4:6],
@@ -42,6 +42,6 @@ def test_every_term_is_on_its_page():
                 assert f"| `{key}` |" in section and field.description
 
 
-def test_parts_that_are_equal_are_one():
+def test_equal_parts_share_a_section():
     paths = [part.paths for part in parts(CONFIGS["ivu"])]
     assert ("sensors.reel1", "sensors.reel2") in paths

@@ -9,17 +9,17 @@ from rtctl.manual.man_page import escape, man_page
 PAGE = Path(__file__).parents[2] / "docs" / "man" / "rtctl.1"
 
 
-def test_the_page_in_the_wheel_is_that_of_the_commands():
+def test_packaged_man_page_agrees_with_the_commands():
     assert PAGE.read_text() == man_page(), f"write it again: python -m rtctl.manual {PAGE}"
 
 
-def test_roff():
+def test_man_page_is_valid_roff():
     assert escape("--for -1") == "\\-\\-for \\-1"
     assert escape(".sh a\\b") == "\\&.sh a\\eb"
     assert "\n.SS rtctl run [OPTIONS] CONFIG\n" in man_page()
 
 
-def test_man_takes_it():
+def test_man_renders_the_page():
     man = shutil.which("man")
     if man is None:
         pytest.skip("there is no man here")

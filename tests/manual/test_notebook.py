@@ -1,4 +1,4 @@
-"""A script with cells becomes a page, and docs/notebook.md is of docs/notebook.py as it stands."""
+"""Page from a script with cells; docs/notebook.md is up to date with docs/notebook.py."""
 
 from pathlib import Path
 
@@ -27,7 +27,7 @@ open("left.txt", "w").close()
 """
 
 
-def test_cells_become_words_code_and_what_they_show(tmp_path, monkeypatch):
+def test_cells_become_text_code_and_output(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     script, out, pictures = tmp_path / "made.py", tmp_path / "made.md", tmp_path / "images"
     script.write_text(SCRIPT)
@@ -36,17 +36,17 @@ def test_cells_become_words_code_and_what_they_show(tmp_path, monkeypatch):
     assert text.startswith("# A title\n\nWords.\n\n```python\nx = 2")
     assert "```text\nsaid\n```\n\n```text\n3\n```" in text
     assert "![made 1](images/made_1.png)" in text and (pictures / "made_1.png").stat().st_size > 1000
-    assert not (tmp_path / "left.txt").exists()  # it runs in a folder of its own
+    assert not (tmp_path / "left.txt").exists()  # the script runs in a temporary folder
 
 
-def test_the_page_is_that_of_the_script():
-    """Run `python -m rtctl.manual.notebook docs/notebook.py docs/notebook.md` where this fails: it takes a minute."""
+def test_notebook_page_agrees_with_its_script():
+    """After a failure run `python -m rtctl.manual.notebook docs/notebook.py docs/notebook.md` (one minute)."""
     text = (DOCS / "notebook.md").read_text("utf-8")
     for cell in cells((DOCS / "notebook.py").read_text("utf-8")):
         assert (cell.text if cell.words else f"```python\n{cell.text}\n```") in text
 
 
-def test_the_page_gets_from_a_recording_to_a_named_effect_and_its_size():
+def test_notebook_page_leads_from_a_recording_to_a_named_effect_and_its_size():
     text = (DOCS / "notebook.md").read_text("utf-8")
     hidden = '"term": "drive.offset", "node": "drive", "offset": "0.8 V"'
     assert hidden in text and "<Diagnosis: named, drive.offset at drive" in text

@@ -1,4 +1,4 @@
-"""A small law to break in many ways."""
+"""Fixtures: a small user law for modification, and configs with user files."""
 
 import sys
 from collections.abc import Callable
@@ -61,7 +61,7 @@ def every_test_leaves_it_as_it_was(library: None) -> None:
 
 @pytest.fixture
 def law() -> Callable[..., str]:
-    """`law("return p.gain * e", {"def reset": "def rest"})`: the text with another step, and other changes."""
+    """`law("return p.gain * e", {"def reset": "def rest"})`: text of the law with another step and replacements."""
 
     def make(body: str = "return p.gain * e", changes: dict[str, str] | None = None) -> str:
         text = LAW.replace("BODY", body)
@@ -75,7 +75,7 @@ def law() -> Callable[..., str]:
 
 @pytest.fixture
 def config_file(tmp_path: Path) -> Callable[..., Path]:
-    """A config of a machine in a folder of its own, with files beside it; `position` and `plant` replace its own."""
+    """A config of a machine in a separate folder with user files; `position` and `plant` are replaced."""
 
     def make(kind: str, files: dict[str, str], **parts: Any) -> Path:
         data = yaml.safe_load((CONFIGS / f"{kind}.yaml").read_text())

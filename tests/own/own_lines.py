@@ -1,6 +1,6 @@
-"""Where something stands in a text."""
+"""Line numbers in a text."""
 
 
 def line(text: str, part: str) -> int:
-    """Number of the line that holds this part."""
+    """Number of the line with the given part."""
     return 1 + text[: text.index(part)].count("\n")

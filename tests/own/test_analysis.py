@@ -1,4 +1,4 @@
-"""Analysis of machines with own files: an own plant is refused in words, an own law or term is not needed."""
+"""Analysis of machines with user files: a user plant is refused; the code of a user law or term is not needed."""
 
 import copy
 from pathlib import Path
@@ -25,7 +25,7 @@ WORKS = ("replay", "trace plot", "trace compare", "trace export", "not there yet
 
 
 def bundle(kind: str, **parts) -> Bundle:
-    """A bundle without rows, whose config is the shipped one with other parts."""
+    """A bundle without rows; its config is the shipped one with replaced parts."""
     data = yaml.safe_load((CONFIGS / f"{kind}.yaml").read_text())
     for key, value in parts.items():
         data[key] = {**data.get(key, {}), **value}
@@ -33,7 +33,7 @@ def bundle(kind: str, **parts) -> Bundle:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_recording_with_an_own_plant_is_refused_with_what_works(kind):
+def test_recording_with_a_user_plant_is_refused_with_a_remedy(kind):
     made = bundle(kind, plant={"kind": PLANT})
     for analysis in (records.config_of, lambda b: read_case(b.case, b.folder)):
         with pytest.raises(UserError, match=r"case\.json: config\.plant\.kind is './my_plant\.py:MyPlant'") as error:
@@ -42,7 +42,7 @@ def test_a_recording_with_an_own_plant_is_refused_with_what_works(kind):
 
 
 @pytest.mark.parametrize("plant", [PLANT, {"kind": PLANT}])
-def test_the_short_form_is_an_own_plant_too(plant):
+def test_short_form_of_a_user_plant_is_refused(plant):
     with pytest.raises(UserError, match="a plant of the user's own"):
         refuse_plant({"plant": plant})
     refuse_plant({"plant": {"kind": "ivu"}})
@@ -50,7 +50,7 @@ def test_the_short_form_is_an_own_plant_too(plant):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_config_with_an_own_plant_is_no_model_and_has_no_response(config_file, kind):
+def test_config_with_a_user_plant_has_no_model_and_no_response(config_file, kind):
     file = config_file(kind, {"my_plant.py": (TEMPLATES / f"my_plant_{kind}.py").read_text()}, plant=PLANT)
     config = loaded(file)
     for analysis in (
@@ -64,7 +64,7 @@ def test_a_config_with_an_own_plant_is_no_model_and_has_no_response(config_file,
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_the_code_of_an_own_law_and_term_is_not_needed(tmp_path, kind):
+def test_code_of_a_user_law_or_term_is_not_needed(tmp_path, kind):
     marker = tmp_path / "ran"
     text = f"open({str(marker)!r}, 'w').close()\n"
     made = bundle(

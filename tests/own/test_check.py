@@ -1,4 +1,4 @@
-"""The check of a law by itself; each case compiles one small step."""
+"""Check of a user law; each case compiles one small step."""
 
 import re
 
@@ -21,7 +21,7 @@ def verdict(text):
     return check(parts, parts.build(parts.settings(gain=2), DT), healthy(own_law.SIGNALS, DT, 1e-3), DT)
 
 
-def test_a_law_in_order_is_measured(law):
+def test_valid_law_is_accepted_and_timed(law):
     found = verdict(law())
     assert 0 < found.median <= found.p99 <= found.worst < DT
     assert found.compiled > 0
@@ -56,13 +56,13 @@ def test_a_law_in_order_is_measured(law):
         ),
     ],
 )
-def test_what_may_not_go_into_the_tick(law, body, where, message):
+def test_law_with_code_not_allowed_in_the_tick_is_refused(law, body, where, message):
     text = law(body)
     with pytest.raises(UserError, match=f"^{re.escape(f'./try.py:{line(text, where)}: {message}')}"):
         verdict(text)
 
 
-def test_a_step_that_takes_longer_than_the_tick_has(law):
+def test_step_longer_than_the_tick_is_refused(law):
     slow = "t = 0.0\n    for i in range(100_000):\n        t += np.sin(e + i)\n    return t"
     with pytest.raises(
         UserError, match=r"step takes .* us in one tick of a hundred .* make it shorter, or the rate lower"
@@ -70,14 +70,14 @@ def test_a_step_that_takes_longer_than_the_tick_has(law):
         verdict(law(slow))
 
 
-def test_a_warning_comes_before_a_refusal():
+def test_slow_step_is_a_warning_before_it_is_refused():
     quick = Verdict("./try.py:Try", 1.0, 1e-8, 2e-8, 3e-8, DT)
     assert quick.warning == ""
     assert "20% of the period in one tick of a hundred" in quick._replace(p99=0.2 * DT, worst=0.2 * DT).warning
     assert "its slowest step took 60%" in quick._replace(worst=0.6 * DT).warning
 
 
-def test_healthy_signals_fit_together():
+def test_nominal_signals_of_the_check_are_consistent():
     made = healthy(("u1", "e"), DT, 1e-3)
     assert {"u1", *own_law.SIGNALS} <= set(made)
     assert all(len(v) == TICKS and np.isfinite(v).all() for v in made.values())

@@ -10,7 +10,7 @@ def source(text, file="./try.py"):
     return Source(file, "Try", text)
 
 
-def test_a_word_of_a_config_is_a_file_or_a_kind_that_comes_with_rtctl():
+def test_kind_in_a_config_is_a_user_file_or_a_shipped_kind():
     assert is_own("./try.py:Try") and is_own("try.py")
     assert not is_own("pd") and not is_own(None) and not is_own({"kind": "pd"})
     assert split("../a b/try.py:Try") == ("../a b/try.py", "Try")
@@ -18,7 +18,7 @@ def test_a_word_of_a_config_is_a_file_or_a_kind_that_comes_with_rtctl():
         split("./try.py")
 
 
-def test_another_text_is_another_module_and_the_same_text_is_the_same():
+def test_changed_text_is_another_module_and_equal_text_the_same():
     one, two = load(source("x = 1\n")), load(source("x = 2\n"))
     assert (one.x, two.x) == (1, 2)
     assert one.__name__ != two.__name__
@@ -39,13 +39,13 @@ def test_another_text_is_another_module_and_the_same_text_is_the_same():
         ("from rtctl.laws import pdd\n", r"\./try\.py:1: cannot import name 'pdd' from 'rtctl\.laws'$"),
     ],
 )
-def test_a_file_that_cannot_be_run_says_where(text, message):
-    for _ in range(2):  # nothing half-made is left behind
+def test_error_in_a_user_file_names_the_line(text, message):
+    for _ in range(2):  # no partial module is left
         with pytest.raises(OwnError, match=message):
             load(source(text))
 
 
-def test_a_file_that_is_not_there_or_no_text(tmp_path):
+def test_missing_or_binary_user_file_is_refused(tmp_path):
     (tmp_path / "try.py").write_text("x = 1\n")
     assert read("./try.py", tmp_path) == "x = 1\n"
     with pytest.raises(OwnError, match=r"\./tri\.py: no such file in .*; did you mean 'try\.py'"):
@@ -61,7 +61,7 @@ def test_a_file_that_is_not_there_or_no_text(tmp_path):
         read("big.py", tmp_path)
 
 
-def test_texts_are_kept_for_people(tmp_path):
+def test_texts_of_user_files_are_saved(tmp_path):
     keep({}, tmp_path)
     assert not list(tmp_path.iterdir())
     keep({"../laws/try.py": "x = 1\n"}, tmp_path)

@@ -1,4 +1,4 @@
-"""Text of an own file that came with data is not run."""
+"""Text of a user file in a bundle is never run."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -16,7 +16,7 @@ from rtctl.own.model import without_code
 from rtctl.trace.bundle import load_case, save_case
 
 
-def test_text_that_nobody_gave_is_not_run(tmp_path: Path) -> None:
+def test_text_of_a_user_file_runs_only_if_the_file_is_named(tmp_path: Path) -> None:
     marker = tmp_path / "ran"
     source = files.Source("./law.py", "Law", f"open({str(marker)!r}, 'w').close()\n")
     with pytest.raises(files.ForeignError, match="--own"):
@@ -56,7 +56,7 @@ def bundle(
     tmp_path: Path, runtime: Path, config_file: Callable[..., Path], law: Callable[..., str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> Own:  # fmt: skip
-    """A recording under an own law, whose text in case.json has got another line since."""
+    """A recording under a user law; the text in case.json has an additional line."""
     only(monkeypatch, "friction.viscous")
     monkeypatch.chdir(tmp_path)
     file = config_file("ivu", {"try.py": law()}, position={"kind": "./try.py:Try", "gain": 20})
@@ -70,7 +70,7 @@ def bundle(
     return Own(tmp_path, tmp_path / "ran")
 
 
-def test_analysis_keeps_an_own_law_as_data_and_leaves_out_own_terms() -> None:
+def test_analysis_keeps_a_user_law_as_data_and_omits_user_terms() -> None:
     data = {
         "machine": "ivu",
         "law": {"position": {"kind": "./a.py:A", "gain": 3}},
@@ -90,7 +90,7 @@ def test_no_command_runs_the_text_in_a_bundle(bundle: Own, capsys: pytest.Captur
         assert not bundle.ran(), name
         assert "came with the data" not in said and code in (0, 3), f"{name}: {said}"
     assert main(["replay", "bundle"]) == 2 and not bundle.ran()
-    assert main(["replay", "bundle", "--own", "try.py"]) == 2  # what was recorded, and not what the bundle holds
+    assert main(["replay", "bundle", "--own", "try.py"]) == 2  # recorded text, not that of the bundle
     assert not bundle.ran()
     assert capsys.readouterr().err.count("replay bundle --own ./try.py") == 2
     assert main(["replay", "bundle", "--own", "foreign.py"]) == 0

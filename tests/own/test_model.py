@@ -1,4 +1,4 @@
-"""Own files in a config: what may stand there, what it becomes, and what is told of mistakes."""
+"""User files in a config: allowed parts, generated tick, and error messages."""
 
 import ast
 from pathlib import Path
@@ -30,14 +30,14 @@ def text_of(config):
     return generate.source(machines.build(config), "shm")
 
 
-def test_without_own_files_the_class_is_the_machine_s(config):
+def test_config_without_user_files_has_the_class_of_the_machine(config):
     made = config("ldu")
     assert type(made) is machines.CONFIGS["ldu"]
     assert made.own == {}
     assert machines.widened(written(made)) == (type(made), written(made))
 
 
-def test_keys_units_and_bounds_are_those_of_the_file(own):
+def test_keys_units_and_bounds_come_from_the_user_file(own):
     assert own.law.position.gain == 31.0
     assert get_path(own, "law.position.kind") == "./try.py:Try"
     assert set_path(own, "law.position.gain", "20 V/rad").law.position.gain == 20.0
@@ -48,20 +48,20 @@ def test_keys_units_and_bounds_are_those_of_the_file(own):
     assert json_schema(type(own))["$defs"]["TrySettings"]["properties"]["gain"]["unit"] == "V/rad"
 
 
-def test_plain_data_is_complete(own, config_file):
+def test_plain_data_contains_the_texts_of_user_files(own, config_file):
     (Path(config_file("ivu", {})).parent / "try.py").unlink()
     again = machines.settings(written(own))
     assert type(again) is type(own) and again == own
     assert machines.settings(own.model_dump(mode="json", exclude_unset=True)) == own
 
 
-def test_a_config_written_to_a_file_needs_no_file_beside_it(own, tmp_path):
+def test_written_config_needs_no_user_file(own, tmp_path):
     (tmp_path / "there").mkdir()
     (tmp_path / "there" / "written.yaml").write_text(to_yaml(own))
     assert loaded(tmp_path / "there" / "written.yaml") == own
 
 
-def test_another_text_is_another_tick_and_another_gain_is_not(own, config_file, law):
+def test_changed_text_changes_the_tick_and_a_changed_gain_does_not(own, config_file, law):
     text = text_of(own)
     ast.parse(text)
     assert text == text_of(set_path(own, "law.position.gain", 20))
@@ -70,7 +70,7 @@ def test_another_text_is_another_tick_and_another_gain_is_not(own, config_file, 
     assert text != text_of(other)
 
 
-def test_what_the_law_raises_ends_in_a_trip(own):
+def test_exception_of_the_law_trips(own):
     lines = text_of(own).splitlines()
     step = next(i for i, line in enumerate(lines) if "u_pd = own_try_" in line)
     assert [line.strip() for line in lines[step - 1 : step + 3]] == [
@@ -79,7 +79,7 @@ def test_what_the_law_raises_ends_in_a_trip(own):
 
 
 @pytest.mark.parametrize("kind", ["ivu", "ldu", "axis"])
-def test_all_in_short(config_file, law, kind):
+def test_user_law_can_be_given_as_a_single_word(config_file, law, kind):
     text = law(changes={"gain: float = quantity(": "gain: float = quantity(5.0, "})
     file = config_file(kind, {"try.py": text}, position="./try.py:Try")
     assert loaded(file).law.position.gain == 5.0
@@ -94,14 +94,14 @@ def test_all_in_short(config_file, law, kind):
         ("./try.py:Tri", r"config.yaml:{}: law.position.kind: ./try.py: there is no class TriSettings; did you mean "),
     ],
 )
-def test_a_mistake_is_told_where_the_config_makes_it(config_file, law, word, message):
+def test_error_in_a_user_law_reference_names_the_config_line(config_file, law, word, message):
     file = config_file("ivu", {"try.py": law()}, position={**TRY, "kind": word})
     at = 1 + next(i for i, line in enumerate(file.read_text().splitlines()) if word in line)
     with pytest.raises(UserError, match=message.format(at)):
         loaded(file)
 
 
-def test_a_mistake_beside_it_is_told_as_for_any_other_law(config_file, law):
+def test_settings_of_a_user_law_are_validated_as_for_shipped_laws(config_file, law):
     file = config_file("ivu", {"try.py": law()}, position={"kind": "./try.py:Try"})
     with pytest.raises(UserError, match=r"law\.position: missing key 'gain' \(proportional gain, in V/rad\)"):
         loaded(file)
@@ -109,13 +109,13 @@ def test_a_mistake_beside_it_is_told_as_for_any_other_law(config_file, law):
         loaded(file, "law.position.gain=-1")
 
 
-def test_data_without_its_texts_is_refused(own):
+def test_plain_data_without_its_texts_is_refused(own):
     data = {**written(own), "own": {}}
     with pytest.raises(OwnError, match="its text is not in the config's `own`"):
         machines.settings(data)
 
 
-def test_a_signal_that_only_another_machine_has(config_file, law):
+def test_signal_of_another_machine_is_refused(config_file, law):
     text = law(changes={"step(p, s, e)": "step(p, s, e, R1)"})
     machines.build(loaded(config_file("ivu", {"try.py": text}, position=TRY)))
     with pytest.raises(OwnError, match="there is no signal 'R1' here"):
@@ -123,7 +123,7 @@ def test_a_signal_that_only_another_machine_has(config_file, law):
 
 
 @pytest.mark.parametrize("kind", ["ivu", "ldu", "axis"])
-def test_an_own_plant_stands_behind_the_same_board(config_file, kind):
+def test_user_plant_is_connected_to_the_emulated_board(config_file, kind):
     file = config_file(
         kind, {"my_plant.py": (TEMPLATES / f"my_plant_{kind}.py").read_text()}, plant="./my_plant.py:MyPlant"
     )
@@ -138,13 +138,13 @@ def test_an_own_plant_stands_behind_the_same_board(config_file, kind):
         loaded(file, "plant.physics=[{term: friction.viscous}]")
 
 
-def test_a_plant_that_leaves_a_sensor_without_an_angle(config_file):
+def test_plant_that_leaves_a_sensor_without_an_angle_is_refused(config_file):
     text = (TEMPLATES / "my_plant_ivu.py").read_text().replace("reel2=float, ", "")
     with pytest.raises(UserError, match=r"MY_PLANT_STATE has no 'reel2', which a sensor of the ivu looks at"):
         loaded(config_file("ivu", {"my_plant.py": text}, plant="./my_plant.py:MyPlant"))
 
 
-def test_an_own_term_stands_beside_those_of_the_library(config_file):
+def test_user_term_is_combined_with_library_terms(config_file):
     terms = [{"term": "friction.viscous", "node": "reel1", "B": 1e-5}, {"term": TERM, "node": "reel1", "c": 1e-5}]
     text = (TEMPLATES / "my_term.py").read_text()
     config = loaded(config_file("ivu", {"my_term.py": text}, plant={"physics": terms}))
@@ -171,7 +171,7 @@ def test_an_own_term_stands_beside_those_of_the_library(config_file):
         ("    node: str\n", "", "MyTermSettings has no key `node`"),
     ],
 )
-def test_a_term_that_does_not_fit(config_file, old, new, message):
+def test_user_term_that_does_not_fit_is_refused(config_file, old, new, message):
     text = (TEMPLATES / "my_term.py").read_text()
     assert old in text
     file = config_file(
@@ -181,13 +181,13 @@ def test_a_term_that_does_not_fit(config_file, old, new, message):
         loaded(file)
 
 
-def test_another_text_needs_a_new_start(own, config_file, law):
+def test_changed_text_of_a_user_law_needs_a_restart(own, config_file, law):
     fresh = loaded(config_file("ivu", {"try.py": law("return p.gain * e * 2.0")}, position=TRY))
     with pytest.raises(UserError, match=r"own: \./try\.py is another text now; restart the machine"):
         reload(SimpleNamespace(config=own), fresh)
 
 
-def test_lines_of_a_term_that_do_not_compile(config_file):
+def test_user_term_that_does_not_compile_is_refused(config_file):
     text = (TEMPLATES / "my_term.py").read_text().replace("return -p.c * v", "return -p.cc * v")
     terms = [{"term": TERM, "node": "reel1", "c": 1e-5}]
     config = loaded(config_file("ivu", {"my_term.py": text}, plant={"physics": terms}))

@@ -13,13 +13,13 @@ def parts(text, name="Try"):
     return own(Source("./try.py", name, text), own_law.FUNCTIONS, own_law.RESULT)
 
 
-def test_names_of_the_idiom():
+def test_class_and_function_names_of_a_user_file():
     assert [upper(n) for n in ("Try", "MyLaw", "Pd2", "PiVelocity")] == ["TRY", "MY_LAW", "PD2", "PI_VELOCITY"]
     assert [camel(n) for n in ("pd", "my_law", "pi_velocity")] == ["Pd", "MyLaw", "PiVelocity"]
 
 
 @pytest.mark.parametrize("kind", ["pd", "pi_velocity", "sections"])
-def test_the_laws_that_come_with_rtctl_come_in_by_the_same_door(kind):
+def test_shipped_laws_satisfy_the_interface_of_user_laws(kind):
     found = builtin(f"rtctl.laws.{kind}", camel(kind))
     assert found.has("step") and found.has("reset")
     assert set(own_law.SIGNALS) >= set(__import__("inspect").signature(found.module.step.py_func).parameters) - {
@@ -28,7 +28,7 @@ def test_the_laws_that_come_with_rtctl_come_in_by_the_same_door(kind):
     }
 
 
-def test_what_a_law_gets_is_what_it_asks_for_by_name(law):
+def test_law_receives_the_signals_it_names(law):
     found = parts(law(changes={"step(p, s, e)": "step(p, s, ref, e)"}))
     text = found.call("step", "position", {"e": "y.error", "ref": "y.ref"})
     assert text == f"{found.module.__name__}.step(p.position, s.position, y.ref, y.error)"
@@ -54,14 +54,14 @@ def test_what_a_law_gets_is_what_it_asks_for_by_name(law):
         ("Try", {"    gain: float = q": "    kind: str = 'x'\n    gain: float = q"}, "class Try", "TrySettings.kind:"),
     ],
 )
-def test_what_is_missing_is_told_with_what_would_be_right(law, name, changes, where, message):
+def test_missing_part_error_shows_the_expected_form(law, name, changes, where, message):
     text = law(changes=changes)
     at = f":{line(text, where)}" if where else ""
     with pytest.raises(OwnError, match=f"^{re.escape(f'./try.py{at}: {message}')}"):
         parts(text, name)
 
 
-def test_a_signal_that_is_not_there(law):
+def test_unknown_signal_is_refused(law):
     text = law(changes={"step(p, s, e)": "step(p, s, e, v_rfe)"})
     with pytest.raises(
         OwnError, match=r"step\(p, s, e, v_rfe\): there is no signal 'v_rfe' here; did you mean 'v_ref'\?"
@@ -69,7 +69,7 @@ def test_a_signal_that_is_not_there(law):
         parts(text).call("step", "position", {"e": "e", "v_ref": "v"})
 
 
-def test_what_build_gives_has_to_be_params(law):
+def test_build_must_return_params(law):
     found = parts(law(changes={"return TryParams(settings.gain)": "return 3.0"}))
     with pytest.raises(OwnError, match=r"build gives a float; it should give a TryParams, a NamedTuple"):
         found.build(found.settings(gain=1), 1e-3)

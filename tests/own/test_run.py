@@ -1,4 +1,4 @@
-"""An own law on an own plant of the reel unit, in the loop: it runs, is tuned, fails, and is replayed."""
+"""User law on a user plant of the reel unit: run, change of a gain, failure, replay."""
 
 import numpy as np
 import pytest
@@ -73,17 +73,17 @@ def running(own, bench):
     return made
 
 
-def test_it_follows_its_reference_and_its_state_is_recorded(running):
+def test_user_law_follows_the_reference_and_its_state_is_recorded(running):
     rows = running.rows
     assert rows["target"][-1] - rows["target"][0] == pytest.approx(1.0)
     assert abs(rows["capstan_error"][-1]) < 0.1
     assert rows["position_n"][-1] == len(rows)
     assert rows["truth_capstan"][-1] == pytest.approx(rows["capstan"][-1], abs=2e-3)
-    assert np.isnan(rows["truth_tension1"]).all()  # nothing in its state is called T1
+    assert np.isnan(rows["truth_tension1"]).all()  # the plant has no state T1
 
 
 @pytest.mark.parametrize("how", [NOT_A_NUMBER, INFINITE, RAISES])
-def test_a_law_that_fails_trips_with_its_outputs_at_zero(running, own, how):
+def test_failing_law_trips_with_zero_outputs(running, own, how):
     running.take_over(set_path(own, "law.position.fail", how))
     rows = running.ask("gains").run(0.1)
     assert rows["trip"][0] == safety.NOT_A_NUMBER
@@ -93,7 +93,7 @@ def test_a_law_that_fails_trips_with_its_outputs_at_zero(running, own, how):
     assert rows["state"][-1] == safety.RUNNING and (rows["trip"] == 0).all()
 
 
-def test_a_law_that_fails_as_the_outputs_come_on(running, own):
+def test_law_that_fails_at_arming_trips(running, own):
     running.take_over(set_path(own, "law.position.fail", RAISES_IN_RESET))
     running.ask("gains", "disarm").run(0.1)
     rows = running.ask("arm").run(0.1)
@@ -101,14 +101,14 @@ def test_a_law_that_fails_as_the_outputs_come_on(running, own):
     assert not rows["u1"].any() and not rows["u2"].any()
 
 
-def test_limits_lie_behind_the_law(bench, own):
+def test_output_limit_applies_after_the_law(bench, own):
     made = bench(set_path(set_path(own, "law.position.gain", 1e4), "law.limit.high", 1.5))
     rows = made.ask("arm", "play").run(2.0)
     assert np.abs(rows["u_c"]).max() > 10.0
     assert max(np.abs(rows["u1"]).max(), np.abs(rows["u2"]).max()) <= 1.505
 
 
-def test_its_rows_come_out_of_it_once_more(running):
+def test_user_law_replays_bit_exact(running):
     replayed = Replay(running.machine)
     replayed.c["arm"] = replayed.c["play"] = replayed.c["order"] = 1
     again = replayed.over(running.rows)
@@ -116,14 +116,14 @@ def test_its_rows_come_out_of_it_once_more(running):
         assert (again[name].view(np.int64) == running.rows[name].view(np.int64)).all()
 
 
-def test_a_recording_says_that_its_law_is_no_law_of_the_format(running):
+def test_recording_marks_a_user_law_as_outside_the_format(running):
     case = describe(running.machine, running.made)
     assert case["controller"]["kind"] == "unknown" and case["controller_known"] is False
     assert case["config"]["own"]["./try.py"] == LAW
     assert "./my_plant.py:MyPlant" in case["notes"] and case["parameters"] == {}
 
 
-def test_a_law_that_may_not_run_is_refused_before_the_tick_is_compiled(config_file, law):
+def test_invalid_law_is_refused_before_the_tick_is_compiled(config_file, law):
     from rtctl import machines
 
     text = law("a = np.zeros(3)\n    return a[0] + e")

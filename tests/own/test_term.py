@@ -1,4 +1,4 @@
-"""A term of the user's own in the library: what fits and diagnosis make of it."""
+"""User term in the library of effects: fits and diagnosis."""
 
 import ast
 
@@ -21,7 +21,7 @@ def source(text=TEXT):
     return Source("./my_term.py", "MyTerm", text)
 
 
-def test_it_is_a_term_like_any_other_once_it_is_registered(tmp_path):
+def test_registered_user_term_is_a_library_term(tmp_path):
     (tmp_path / "my_term.py").write_text(TEXT)
     register_file(SPEC, tmp_path)
     term = TERMS[SPEC]
@@ -30,7 +30,7 @@ def test_it_is_a_term_like_any_other_once_it_is_registered(tmp_path):
     assert texts([SPEC, "friction.viscous"]) == {"./my_term.py": TEXT}
 
 
-def test_what_it_calls_typical_is_what_a_fit_begins_with():
+def test_fit_starts_at_the_typical_value_of_a_user_term():
     register([source()])
     assert sizes(SPEC) == {"c": (1e-6, 1e-3)} and sizes("friction.viscous") == {}
     (part,) = parts_of(SPEC)
@@ -38,7 +38,7 @@ def test_what_it_calls_typical_is_what_a_fit_begins_with():
     assert part.share == pytest.approx((1e-6 * 1e-3) ** 0.5)
 
 
-def test_the_kernel_of_the_fits_holds_it():
+def test_kernel_of_the_fits_includes_a_user_term():
     before = kernel.source()
     register([source()])
     after = kernel.source()
@@ -49,12 +49,12 @@ def test_the_kernel_of_the_fits_holds_it():
     ast.parse(after)
 
 
-def test_a_range_that_is_none():
+def test_invalid_range_of_a_user_term_is_refused():
     with pytest.raises(OwnError, match=r"MY_TERM\.typical: c: \(0, 1\) should be a setting's lowest and highest size"):
         own_term(source(TEXT.replace("(1e-6, 1e-3)", "(0.0, 1.0)")))
 
 
-def test_a_mistake_on_the_command_line():
+def test_invalid_term_option_is_refused():
     from rtctl.cli.diagnose import _register
 
     with pytest.raises(UserError, match=r"--term \./none\.py:None: \./none\.py: no such file"):

@@ -1,4 +1,4 @@
-"""One sdist, the wheel of the tree and the wheel of the sdist, built once for all tests here; no network."""
+"""Fixtures: sdist, wheel of the tree and wheel of the sdist, built once without network."""
 
 import subprocess
 import sys
@@ -30,7 +30,7 @@ def names(archive: Path) -> set[str]:
 
 
 def tracked() -> list[str]:
-    """Files of the project: what git knows, and what is new and not ignored."""
+    """Files of the project: tracked files, and new files that are not ignored."""
     listed = subprocess.run(
         ["git", "ls-files", "--cached", "--others", "--exclude-standard"], cwd=ROOT, capture_output=True, text=True
     )
@@ -41,7 +41,7 @@ def tracked() -> list[str]:
 
 
 def build(hook: str, source: Path, folder: Path) -> Path:
-    """What a front end such as pip asks setuptools for, without its own environment."""
+    """Build call of a front end such as pip, without an isolated environment."""
     folder.mkdir(parents=True, exist_ok=True)
     done = subprocess.run([sys.executable, "-c", BUILD, hook, str(folder)], cwd=source, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr[-2000:]

@@ -1,4 +1,4 @@
-"""The wheel in an environment of its own, away from the project, in a folder that nobody may write to."""
+"""The wheel in a fresh environment outside of the project, in a read-only folder."""
 
 import os
 import site
@@ -12,7 +12,7 @@ import pytest
 
 
 class Installed:
-    """A fresh environment with the wheel; other libraries are those of the tests."""
+    """A fresh environment with the wheel and the libraries of the tests."""
 
     def __init__(self, folder: Path, wheel: Path):
         self.folder, self.bin = folder, folder / "env" / "bin"
@@ -50,7 +50,7 @@ def installed(built, tmp_path_factory):
     return Installed(tmp_path_factory.mktemp("installed"), built.wheel)
 
 
-def test_version_and_place(installed):
+def test_installed_version_and_location(installed):
     said = installed("rtctl", "--version")
     assert (said.returncode, said.stderr) == (0, "")
     assert said.stdout.startswith("rtctl ")
@@ -58,12 +58,12 @@ def test_version_and_place(installed):
     assert where.startswith(str(installed.packages))
 
 
-def test_configs_come_along(installed):
+def test_installed_package_contains_the_configs(installed):
     said = installed("rtctl", "check", "ldu_printer", "--reference", "print_steps")
     assert (said.returncode, said.stdout.partition("\n")[0]) == (0, "ok")
 
 
-def test_man_page_and_units_are_below_the_prefix(installed):
+def test_man_page_and_units_are_installed_below_the_prefix(installed):
     share = installed.folder / "env" / "share"
     assert (share / "man" / "man1" / "rtctl.1").read_text().startswith(".TH RTCTL 1")
     assert (share / "rtctl" / "systemd" / "rtctl@.service").is_file()
@@ -79,12 +79,12 @@ print(sum(module.entry.stats.cache_hits.values()))
 """
 
 
-def test_a_read_only_installation_compiles_into_the_cache(installed, tmp_path):
-    """Nothing is written into the packages, and the second process finds the machine code of the first."""
+def test_read_only_installation_compiles_into_the_cache(installed, tmp_path):
+    """The packages stay unchanged, and the second process finds the compiled code of the first."""
     before = tree(installed.packages)
     folders = [p for p in (installed.packages, *installed.packages.rglob("*")) if p.is_dir()]
     for folder in folders:
-        folder.chmod(stat.S_IRUSR | stat.S_IXUSR)  # root may write all the same, hence the comparison
+        folder.chmod(stat.S_IRUSR | stat.S_IXUSR)  # root can write anyway, hence the comparison
     try:
         runs = [installed("python", "-B", "-c", TINY, RTCTL_CACHE_DIR=str(tmp_path / "cache")) for _ in range(2)]
     finally:

@@ -1,4 +1,4 @@
-"""`rtctl reproduce`: exit codes, JSON, progress on standard error, the page where it is asked for."""
+"""`rtctl reproduce`: exit codes, JSON, progress on stderr, and the page on request."""
 
 import json
 
@@ -19,7 +19,7 @@ def asked(*arguments: str):
     return CliRunner().invoke(cli.app, [*arguments, "--jobs", "1"])
 
 
-def test_json_has_the_rows():
+def test_json_contains_the_rows():
     done = asked("--only", "7", "--short", "--json")
     assert done.exit_code == 0
     rows = json.loads(done.stdout)["rows"]
@@ -33,7 +33,7 @@ def test_json_has_the_rows():
     assert "[2/2] chapter 7" in done.stderr
 
 
-def test_a_failing_row_makes_exit_code_1(monkeypatch):
+def test_failing_row_is_exit_code_1(monkeypatch):
     row = chapter07.DRIVER[0]._replace(thesis=0.5)
     part = chapter07.PARTS[0]._replace(rows=(row,))
     monkeypatch.setattr(run, "parts", lambda only: [part])
@@ -42,7 +42,7 @@ def test_a_failing_row_makes_exit_code_1(monkeypatch):
     assert "FAIL    7.sensing_resistor" in done.stdout and "Failing: 7.sensing_resistor" in done.stdout
 
 
-def test_a_row_that_differs_as_it_says_is_no_failure(monkeypatch):
+def test_row_with_a_declared_difference_is_no_failure(monkeypatch):
     row = chapter07.DRIVER[0]._replace(thesis=0.5, chosen="", differs="another resistor")
     monkeypatch.setattr(run, "parts", lambda only: [chapter07.PARTS[0]._replace(rows=(row,))])
     done = asked("--only", "7.sensing_resistor")
@@ -51,20 +51,20 @@ def test_a_row_that_differs_as_it_says_is_no_failure(monkeypatch):
     assert asked("--only", "7.sensing_resistor").exit_code == 1
 
 
-def test_page_and_figures_where_they_are_asked_for(tmp_path):
+def test_page_and_figures_are_written_on_request(tmp_path):
     done = asked("--only", "7.4", "--out", "here")
     assert done.exit_code == 0
     assert "## Chapter 7" in (tmp_path / "here" / "reproduction.md").read_text()
     assert (tmp_path / "here" / run.FOLDER / "figure_7_4.png").is_file()
 
 
-def test_a_part_of_it_writes_no_page(tmp_path):
+def test_partial_reproduction_writes_no_page(tmp_path):
     (tmp_path / "docs").mkdir()
     assert asked("--only", "7.oscillator").exit_code == 0
     assert not list((tmp_path / "docs").iterdir())
 
 
-def test_user_mistakes(tmp_path):
+def test_invalid_arguments_are_refused(tmp_path):
     done = asked("--only", "99")
     assert isinstance(done.exception, UserError) and "no such chapter" in str(done.exception)
     done = asked()

@@ -1,4 +1,4 @@
-"""The page tells thesis and measured side by side, errata, failures, and its figures."""
+"""Page of results: thesis and measurement side by side, errata, failures, figures."""
 
 from rtctl.reproduce import page
 from rtctl.reproduce.rows import Row
@@ -20,7 +20,7 @@ def results():
     ]
 
 
-def test_tables_by_chapter():
+def test_page_has_tables_by_chapter():
     text = page.text(results())
     said = " ".join(text.split())
     assert r"| `8.delay` | delay, \|T\| = 0 dB | 3 ms | 3.01 ms | 3 % | pass | (8.2) |" in text
@@ -42,13 +42,13 @@ def test_tables_by_chapter():
     )
 
 
-def test_written_into_a_folder(tmp_path):
+def test_page_is_written_into_a_folder(tmp_path):
     path = page.write(results(), tmp_path)
     assert path == tmp_path / "reproduction.md"
     assert path.read_text() == page.text(results())
 
 
-def test_numbers_and_tolerances():
+def test_format_of_numbers_and_tolerances():
     assert page.value(0.000263158, "rad") == "0.000263 rad"
     assert page.value(0.0, "") == "0"
     assert page.value(63.9508, "rad/s^2/A") == "63.95 rad/s^2/A"

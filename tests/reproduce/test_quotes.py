@@ -1,4 +1,4 @@
-"""Every row says what it was computed with, and quotes the thesis to the letter from the section that it names."""
+"""Every row names its inputs and quotes the named section of the thesis verbatim."""
 
 import re
 from functools import cache
@@ -32,27 +32,27 @@ def sections() -> dict[str, str]:
 
 
 @pytest.mark.parametrize("row", ROWS, ids=[row.name for row in ROWS])
-def test_what_a_row_was_computed_with(row):
+def test_every_row_names_its_inputs(row):
     assert row.law and row.set and row.filter
     assert row.quote and "`" not in row.quote
     assert not (row.erratum and row.differs) and not (row.chosen and (row.erratum or row.differs))
 
 
 @pytest.mark.parametrize("row", ROWS, ids=[row.name for row in ROWS])
-def test_the_quote_is_in_the_section(row):
+def test_quote_is_in_the_named_section(row):
     section = row.source.split(",")[0]
     assert section in sections(), section
     assert one_line(row.quote) in sections()[section]
 
 
 @pytest.mark.parametrize(("section", "quote", "right"), page.ERRATA)
-def test_errata_without_a_number(section, quote, right):
+def test_errata_without_a_number_are_quoted_on_the_page(section, quote, right):
     assert one_line(quote) in sections()[section] and right
     assert f"| {section} | `{one_line(quote)}` |" in page.text([])
 
 
-def test_a_number_without_a_quote_of_it_is_none():
-    """The thesis prints no 6 dB beside 38/22 mm, and no error with a schedule."""
+def test_row_without_a_quote_has_no_thesis_value():
+    """The thesis has no 6 dB for 38/22 mm and no error with a schedule."""
     for name in ("8.gain_margin_40_40", "8.gain_margin_40_20", "8.gain_margin_20_20", "9.gain_margin_fixed", "9.error"):
         (row,) = (row for row in ROWS if row.name == name)
         assert row.thesis is None and not row.erratum
@@ -63,6 +63,6 @@ def test_a_number_without_a_quote_of_it_is_none():
     ["7.sensing_resistor", "7.error_capacitor", "7.error_resistor", "12.normal_force", "12.present_bandwidth",
      "12.present_gain_margin", "12.gain_margin", "11.trend", "6.tension_moving_10000", "12.resonance_1"],
 )  # fmt: skip
-def test_inputs_taken_from_the_number_itself_are_named(name):
+def test_inputs_chosen_to_match_the_thesis_value_are_marked(name):
     (row,) = (row for row in ROWS if row.name == name)
     assert row.chosen

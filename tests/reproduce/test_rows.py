@@ -1,4 +1,4 @@
-"""A row passes by its own tolerance, against the thesis or against what its equations give."""
+"""Verdict of a row: tolerance against the thesis value or against its equations."""
 
 import math
 
@@ -22,7 +22,7 @@ ROW = Row("8.delay", "delay", "(8.2)", 3.0, "ms", 0.03)
         (ROW._replace(tolerance=0.0), (3.0,), (3.0001,)),
     ],
 )
-def test_passes(row, good, bad):
+def test_row_passes_within_its_tolerance(row, good, bad):
     assert all(row._replace(measured=value).passes for value in good)
     assert not any(row._replace(measured=value).passes for value in bad)
 
@@ -38,15 +38,15 @@ def test_passes(row, good, bad):
         (ROW._replace(erratum="a factor of 2", expected=6.0), 6.0, "erratum"),
         (ROW._replace(erratum="a factor of 2", expected=6.0), 3.0, "fail"),
         (ROW._replace(differs="friction"), 4.0, "differs"),
-        (ROW._replace(differs="friction"), 3.0, "fail"),  # it says that it differs, and it does not
+        (ROW._replace(differs="friction"), 3.0, "fail"),  # declared difference, but within the tolerance
         (ROW._replace(differs="friction"), math.nan, "fail"),
     ],
 )
-def test_verdict(row, measured, verdict):
+def test_verdict_of_a_row(row, measured, verdict):
     assert row._replace(measured=measured).verdict == verdict
 
 
-def test_rows_under_one_law():
+def test_common_law_and_parameter_set_of_rows():
     own = ROW._replace(law="PD")
     made = under(ROW, own, law="none at all", set="identified")
     assert [(row.law, row.set, row.filter) for row in made] == [
@@ -55,7 +55,7 @@ def test_rows_under_one_law():
     ]
 
 
-def test_json_says_what_it_was_held_against():
+def test_json_names_the_reference_value():
     row = ROW._replace(expected=6.0, erratum="a factor of 2", measured=6.1)
     made = row.as_json()
     assert {"name", "source", "thesis", "measured", "tolerance", "pass", "erratum"} <= set(made)
@@ -65,7 +65,7 @@ def test_json_says_what_it_was_held_against():
     assert ROW.as_json()["measured"] is None and ROW.as_json()["erratum"] is None
 
 
-def test_an_experiment_without_an_answer_fails_its_rows_and_says_why():
+def test_experiment_without_an_answer_fails_its_rows_with_a_reason():
     def play(short):
         raise NoAnswer("too short from 1 to 2 Hz")
 
@@ -74,7 +74,7 @@ def test_an_experiment_without_an_answer_fails_its_rows_and_says_why():
     assert row.as_json()["remark"] == "too short from 1 to 2 Hz"
 
 
-def test_a_part_may_measure_more_than_is_asked_for():
+def test_additional_measured_values_are_ignored():
     part = Part("delay", (ROW,), lambda short: {"8.delay": 3.01, "8.gain": 6.2})
     assert [row.measured for row in measured(part, True)] == [3.01]
     assert part.chapter == 8

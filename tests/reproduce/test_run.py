@@ -28,7 +28,7 @@ def drawn(i: int, number: str) -> rows.Picture:
 
 
 @pytest.mark.parametrize(("i", "name"), NAMES, ids=[name for _, name in NAMES])
-def test_row(i, name):
+def test_row_has_the_expected_verdict(i, name):
     row = played(i)[name]
     assert row.verdict != "fail", (
         row.refused or f"{row.measured:.5g} {row.unit}, against {row.against:g} within {row.margin:.3g}"
@@ -36,7 +36,7 @@ def test_row(i, name):
 
 
 @pytest.mark.parametrize(("i", "number"), FIGURES, ids=[number for _, number in FIGURES])
-def test_figure(i, number, tmp_path):
+def test_figure_is_drawn(i, number, tmp_path):
     picture = drawn(i, number)
     assert picture.number == number
     assert picture.sentence.endswith(".") and not re.search(r"\bnan\b", picture.sentence)
@@ -44,17 +44,17 @@ def test_figure(i, number, tmp_path):
     assert 2_000 < figures.save(picture.figure, tmp_path, number).stat().st_size < 60_000
 
 
-def test_all_rows_and_figures_are_there():
+def test_all_rows_and_figures_exist():
     names = [name for _, name in NAMES]
     assert len(set(names)) == len(names) >= 40
     assert {int(name.partition(".")[0]) for name in names} == set(run.MODULES)
     assert sorted(number for _, number in FIGURES) == sorted(WANTED.split())
 
 
-CORRECTED = {  # verdict, and what is measured: each of these said something else before
+CORRECTED = {  # verdict and measured value of rows corrected after the first version
     "5.process_gain": ("erratum", 64.0),
     "5.bandwidth_high": ("erratum", 3.64),
-    "5.phase_margin_empty": ("erratum", 68.4),  # of the set as listed; 56 deg are those of another J_m
+    "5.phase_margin_empty": ("erratum", 68.4),  # parameter set as listed; 56 deg belong to another J_m
     "5.phase_margin_empty_heavy": ("differs", 55.8),
     "6.overshoot": ("differs", 1.18),  # mm, with the 500 increments of the text; the camera has 0.5 mm
     "6.overshoot_10000": ("differs", 0.70),
@@ -67,13 +67,13 @@ CORRECTED = {  # verdict, and what is measured: each of these said something els
     "7.motor_constant": ("erratum", 4790.0),
     "8.m_1": ("erratum", 0.206),
     "8.m_2": ("erratum", 16.6),
-    "8.mode_tape": ("pass", 1.88),  # where the gain rises, not the mode at 2.55 Hz
+    "8.mode_tape": ("pass", 1.88),  # frequency of the rising gain, not of the mode at 2.55 Hz
     "8.mode_shaft": ("pass", 40.6),  # damped, not |lambda| = 41.6
     "8.hump_shaft": ("pass", 39.7),
     "8.bandwidth": ("pass", 0.595),  # as printed
     "8.stable": ("pass", 1.18),
     "8.gain_margin_40_40": ("pass", 1.18),
-    "8.step_error_1": ("differs", 11.6),  # the law as printed, a tape that cannot push
+    "8.step_error_1": ("differs", 11.6),  # printed law, tape without compression
     "8.step_error_2": ("pass", 11.3),
     "8.accuracy": ("differs", 0.145),
     "8.accuracy_printed": ("erratum", 0.1325),
@@ -99,14 +99,14 @@ CORRECTED = {  # verdict, and what is measured: each of these said something els
 
 
 @pytest.mark.parametrize("name", CORRECTED)
-def test_corrected(name):
+def test_corrected_row_keeps_its_verdict_and_value(name):
     (i,) = (i for i, row in NAMES if row == name)
     row = played(i)[name]
     assert (row.verdict, row.measured) == (CORRECTED[name][0], pytest.approx(CORRECTED[name][1], rel=0.02))
 
 
 def test_error_of_a_step_depends_on_law_and_tape():
-    """Rows have one law throughout: as printed, with a tape that cannot push. Three others are in the remark."""
+    """All rows use the printed law and a tape without compression. The remark lists three other combinations."""
     from rtctl.reproduce import chapter08 as ch
 
     def errors(printed: bool, slack: bool) -> list[float]:
@@ -120,7 +120,7 @@ def test_error_of_a_step_depends_on_law_and_tape():
     assert min(slack["truth_tension1"].min(), slack["truth_tension2"].min()) > -1e-9
 
 
-def test_captions_say_what_is_not_the_figure_of_the_thesis():
+def test_captions_name_the_differences_from_the_thesis_figure():
     said = {
         "5.2": "with the identified J_m", "6.2": "in place of the 500", "8.2": "five times the printed gains",
         "8.4": "chosen here", "8.6": "the law as printed", "11.7": "does not show 150 and 300 mm as two peaks",
@@ -132,7 +132,7 @@ def test_captions_say_what_is_not_the_figure_of_the_thesis():
             assert said[number] in drawn(i, number).sentence, number
 
 
-def test_wide_tolerances_say_why():
+def test_wide_tolerance_has_a_reason():
     for part in PARTS:
         for row in part.rows:
             if row.bound == "within" and row.margin > 0.1 * abs(row.against) * (1 + 1e-9) and row.against:
@@ -140,7 +140,7 @@ def test_wide_tolerances_say_why():
             assert (row.thesis is None or row.erratum or row.expected is None) and row.source and row.quantity
 
 
-def test_only():
+def test_only_selects_chapters_rows_and_figures():
     assert {part.chapter for part in run.parts("9")} == {9}
     (part,) = run.parts("8.delay")
     assert [row.name for row in part.rows] == ["8.delay"]
@@ -152,7 +152,7 @@ def test_only():
         run.parts("13")
 
 
-def test_parts_are_played_in_order_with_a_word_each(tmp_path):
+def test_parts_run_in_order_with_a_progress_message(tmp_path):
     said: list[str] = []
     which = run.parts("7")
     results = run.reproduce(which, True, tmp_path, say=said.append)
@@ -162,7 +162,7 @@ def test_parts_are_played_in_order_with_a_word_each(tmp_path):
     assert (tmp_path / run.FOLDER / "figure_7_4.png").is_file()
 
 
-def test_side_by_side_is_the_same(tmp_path):
+def test_parallel_run_gives_equal_rows(tmp_path):
     which = [run.parts("7.oscillator")[0], run.parts("12.notch")[0]]
     one, two = (run.reproduce(which, True, None, jobs) for jobs in (1, 2))
     assert [result.rows for result in one] == [result.rows for result in two]

@@ -1,4 +1,4 @@
-"""Rows of a machine that is only a table, and what a frame holds."""
+"""Fixtures: rows of a synthetic machine, and a decoder of frames."""
 
 import json
 from collections.abc import Callable
@@ -16,7 +16,7 @@ RATE = 1000.0
 
 @pytest.fixture
 def rows() -> Callable[..., np.ndarray]:
-    """`rows(first, count, u=...)`: rows of 1 kHz; u is given as a function of t."""
+    """`rows(first, count, u=...)`: rows at 1 kHz; u is a function of t."""
 
     def make(first: int, count: int, u: Callable[[np.ndarray], Any] = np.sin) -> np.ndarray:
         made = np.zeros(count, ROW)
@@ -36,7 +36,7 @@ def history() -> History:
 
 @pytest.fixture
 def unpack() -> Callable[[bytes], tuple[dict[str, Any], np.ndarray]]:
-    """A frame as the page reads it: what it says of itself, and its arrays."""
+    """Decode a frame as the page does: header and arrays."""
 
     def read(frame: bytes) -> tuple[dict[str, Any], np.ndarray]:
         length = int.from_bytes(frame[:4], "little")

@@ -1,4 +1,4 @@
-"""The page in a real browser, a reel unit in real time behind it. One of each for all tests."""
+"""The page in a real browser with a reel unit in real mode; shared by all tests."""
 
 import asyncio
 import contextlib
@@ -28,13 +28,13 @@ pytestmark = [
     pytest.mark.realtime,
     pytest.mark.skipif(CHROMIUM is None, reason="no chromium here: apt-get install chromium"),
 ]
-# A busy machine may keep the loop waiting for longer than a real one would bear.
+# Safety limits that do not trip on a busy machine.
 PATIENT = ("loop.realtime=off", "safety.link_timeout=10", "safety.missed_ticks=0", "safety.following_error=0")
-LONGEST = 60_000  # ms, on a machine that does many other things
+LONGEST = 60_000  # ms, for a busy machine
 
 
 class Machine:
-    """A daemon as a process, which can be ended and started again."""
+    """A daemon process that can be stopped and restarted."""
 
     def __init__(self, name, folder):
         self.name, self._folder, self._runs = name, folder, 0
@@ -63,7 +63,7 @@ class Machine:
 
 
 class Server:
-    """The scope's server in a thread, which can be ended and started again on the same port."""
+    """Server of the scope in a thread; can be stopped and restarted on the same port."""
 
     def __init__(self, name, folder):
         self._name, self._folder = name, folder
@@ -125,7 +125,7 @@ def browser():
 
 @pytest.fixture
 def open_page(browser, server):
-    """`open_page()` gives a page that shows traces. Nothing may be said on any page's console."""
+    """`open_page()`: a page that shows traces. The consoles of all pages must stay empty."""
     said, contexts = [], []
 
     def make(**options):
@@ -147,7 +147,7 @@ def open_page(browser, server):
 
 
 def until(page, expression):
-    """Wait until this holds in the page. Playwright's own way to wait needs eval, which the page does not allow."""
+    """Wait until a condition holds in the page. The wait of Playwright needs eval, which the page forbids."""
     deadline = time.monotonic() + LONGEST / 1000
     while not page.evaluate(f"() => Boolean({expression})"):
         assert time.monotonic() < deadline, f"{expression}; said: {page.inner_text('#said')}"
@@ -166,7 +166,7 @@ def state(page, name):
 HIGHEST = "(name) => Math.max(...window.scope.traces.high[window.scope.traces.names.indexOf(name)])"
 
 
-def test_a_step_is_commanded_and_its_trace_appears_to_all_viewers(open_page):
+def test_commanded_step_is_shown_to_all_viewers(open_page):
     page, other = open_page(), open_page(color_scheme="dark")
     press(page, "arm")
     state(page, "running")
@@ -183,7 +183,7 @@ def test_a_step_is_commanded_and_its_trace_appears_to_all_viewers(open_page):
     state(other, "idle")
 
 
-def test_keys_alone_hold_zoom_and_measure(open_page):
+def test_keyboard_controls_hold_zoom_and_cursors(open_page):
     page = open_page()
     page.keyboard.press(" ")
     until(page, "window.scope.traces.about.held")
@@ -204,7 +204,7 @@ def test_keys_alone_hold_zoom_and_measure(open_page):
         until(page, f"window.scope.traces.kind === '{kind}'")
 
 
-def test_a_trigger_catches_one_sweep_with_what_was_before(open_page):
+def test_single_trigger_shows_one_sweep_with_its_pretrigger(open_page):
     page = open_page()
     press(page, "arm")
     state(page, "running")
@@ -225,7 +225,7 @@ def test_a_trigger_catches_one_sweep_with_what_was_before(open_page):
     press(page, "disarm")
 
 
-def test_a_bound_is_told_in_the_words_of_the_daemon_and_a_trip_shows(open_page):
+def test_refusal_message_of_the_daemon_and_a_trip_are_shown(open_page):
     page = open_page()
     page.click("#settings summary")
     limit = page.locator("input[data-path='safety.following_error']")
@@ -248,7 +248,7 @@ def test_a_bound_is_told_in_the_words_of_the_daemon_and_a_trip_shows(open_page):
     page.wait_for_selector("#banner", state="hidden")
 
 
-def test_it_comes_back_after_the_daemon_and_after_the_server(open_page, machine, server):
+def test_page_reconnects_after_a_restart_of_daemon_and_server(open_page, machine, server):
     page = open_page()
     server.stop()
     page.wait_for_selector("#banner:has-text('server does not answer')")
@@ -261,7 +261,7 @@ def test_it_comes_back_after_the_daemon_and_after_the_server(open_page, machine,
     open_page.said[:] = [text for text in open_page.said if "ERR_CONNECTION_REFUSED" not in text]
 
 
-def test_what_is_shown_is_saved_as_numbers_and_as_a_picture(open_page, tmp_path):
+def test_shown_traces_are_saved_as_numbers_and_as_a_picture(open_page, tmp_path):
     page = open_page()
     page.keyboard.press(" ")
     until(page, "window.scope.traces.about.held")
@@ -285,7 +285,7 @@ def test_what_is_shown_is_saved_as_numbers_and_as_a_picture(open_page, tmp_path)
     assert len(np.unique(image.reshape(-1, image.shape[2]), axis=0)) > 5
 
 
-def test_the_scale_of_a_lane_is_held_and_set(open_page):
+def test_scale_of_a_lane_is_held_and_set(open_page):
     page = open_page()
     lane = page.locator(".lane").first
     lane.locator(".scale button").click()
@@ -325,7 +325,7 @@ LABELS = """async ([ticks, factor]) => {
         ([None, 1e-9, 2e-9], 1.0),
     ],
 )
-def test_labels_of_ticks_differ_and_have_room(open_page, ticks, factor):
+def test_tick_labels_are_distinct_and_do_not_overlap(open_page, ticks, factor):
     words, offset = open_page().evaluate(LABELS, [ticks, factor])
     known = [word for word, tick in zip(words, ticks, strict=True) if tick is not None]
     assert len(set(known)) == len(known)
@@ -336,7 +336,7 @@ def test_labels_of_ticks_differ_and_have_room(open_page, ticks, factor):
 
 
 @pytest.mark.parametrize("size", [(1100, 760), (800, 600), (390, 844)])
-def test_names_of_traces_stand_beside_them(open_page, size):
+def test_trace_names_are_next_to_their_traces(open_page, size):
     page = open_page()
     page.set_viewport_size({"width": size[0], "height": size[1]})
     until(page, "window.scope.plots.lanes.every(l => Math.abs(l.plot.width - l.graph.clientWidth) < 2)")
@@ -349,13 +349,13 @@ def test_names_of_traces_stand_beside_them(open_page, size):
     assert page.evaluate("document.documentElement.scrollWidth") <= size[0]
 
 
-def test_a_narrow_screen_needs_no_sideways_scrolling(open_page):
+def test_narrow_screen_needs_no_horizontal_scrolling(open_page):
     page = open_page()
     page.set_viewport_size({"width": 360, "height": 740})
     assert page.evaluate("document.documentElement.scrollWidth") <= 360
 
 
-def test_a_page_that_is_opened_before_the_machine_runs(browser, runtime, tmp_path):
+def test_page_opened_before_the_machine_runs(browser, runtime, tmp_path):
     machine, server = Machine(f"late{os.getpid()}", tmp_path), Server(f"late{os.getpid()}", tmp_path)
     server.start()
     page, said = browser.new_page(), []

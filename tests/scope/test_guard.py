@@ -4,7 +4,7 @@ from rtctl.config.errors import UserError
 from rtctl.scope.guard import kept_token
 
 
-def test_the_token_outlives_the_server_and_is_for_its_owner_alone(tmp_path):
+def test_token_is_persistent_and_readable_by_its_owner_only(tmp_path):
     path = tmp_path / "scope.token"
     token = kept_token(path)
     assert len(token) >= 32
@@ -13,7 +13,7 @@ def test_the_token_outlives_the_server_and_is_for_its_owner_alone(tmp_path):
     assert kept_token(tmp_path / "other") != token
 
 
-def test_a_token_that_others_can_read_is_refused(tmp_path):
+def test_token_readable_by_others_is_refused(tmp_path):
     path = tmp_path / "scope.token"
     kept_token(path)
     path.chmod(0o644)
@@ -21,7 +21,7 @@ def test_a_token_that_others_can_read_is_refused(tmp_path):
         kept_token(path)
 
 
-def test_a_link_is_not_followed(tmp_path):
+def test_link_in_place_of_the_token_is_not_followed(tmp_path):
     (tmp_path / "scope.token").symlink_to(tmp_path / "elsewhere")
     with pytest.raises(UserError, match=r"scope\.token: no file"):
         kept_token(tmp_path / "scope.token")

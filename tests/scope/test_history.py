@@ -17,7 +17,7 @@ def table(first, count):
 
 @settings(deadline=None)
 @given(st.lists(st.integers(0, 25), max_size=12), st.integers(0, 80), st.integers(0, 30))
-def test_rows_come_back_by_their_number_however_they_came(blocks, first, count):
+def test_rows_are_found_by_number_for_any_batches(blocks, first, count):
     kept, sent = History(ROW, 16), 0
     for block in blocks:
         kept.append(table(sent, block))
@@ -28,7 +28,7 @@ def test_rows_come_back_by_their_number_however_they_came(blocks, first, count):
     assert taken.tolist() == [[0.5 * n for n in expected], expected]
 
 
-def test_rows_that_the_sender_lost_are_counted():
+def test_rows_lost_by_the_sender_are_counted():
     kept = History(ROW, 100)
     kept.append(table(5, 10))
     kept.append(table(18, 2))

@@ -1,4 +1,4 @@
-"""Lanes of a model: late by a fixed time, gathered from reports that overlap, and begun anew with another run."""
+"""Lanes of a model: fixed delay, overlapping reports, and a restart with another run."""
 
 import numpy as np
 import pytest
@@ -11,30 +11,30 @@ def told(t, values):
     return {"t": t, "lanes": {"missing_a": {"unit": "Nm", "values": values}}}
 
 
-def test_values_are_those_of_a_fixed_time_before():
+def test_lane_values_have_a_fixed_delay():
     lanes = Lanes()
     lanes.take(told([1.0, 2.0], [1.0, 2.0]))
-    lanes.take(told([2.0, 3.0], [9.0, 3.0]))  # the second time of 2 s says nothing new
+    lanes.take(told([2.0, 3.0], [9.0, 3.0]))  # the repeated time of 2 s is ignored
     t = np.array([0.0, 1.0, 2.0, 2.5, 3.0]) + DELAY
     np.testing.assert_allclose(lanes.at(t, lanes.names)["missing_a"], [0.0, 1.0, 2.0, 2.5, 3.0])
     assert [(s["name"], s["unit"]) for s in lanes.signals] == [("missing_a", "Nm")]
 
 
-def test_another_run_begins_anew():
+def test_lanes_restart_with_another_run():
     lanes = Lanes()
     lanes.take(told([100.0, 101.0], [5.0, 5.0]))
     lanes.take(told([1.0, 2.0], [1.0, 2.0]))
     assert lanes.at(np.array([1.5 + DELAY]), ["missing_a"])["missing_a"] == pytest.approx(1.5)
 
 
-def test_no_report_is_no_lane():
+def test_no_report_gives_no_lane():
     lanes = Lanes()
     lanes.take(None)
     lanes.take({"t": [], "lanes": {}})
     assert lanes.names == ()
 
 
-def test_a_history_takes_signals_beside_the_rows():
+def test_history_accepts_signals_in_addition_to_the_rows():
     row = np.dtype([("tick", np.int64), ("u", float)])
     history = History(row, 4)
     rows = np.array([(k, float(k)) for k in range(3)], row)

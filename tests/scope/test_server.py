@@ -1,4 +1,4 @@
-"""The server with a daemon that is only sockets: rows as they are published, answers as a daemon gives them."""
+"""Server of the scope with a stubbed daemon: published rows and command replies."""
 
 import asyncio
 import contextlib
@@ -24,7 +24,7 @@ number = itertools.count(1)
 
 
 class Daemon:
-    """A daemon of 1 kHz in a thread: publishes ten rows every 10 ms, and does to its config what it is asked.
+    """A stubbed daemon at 1 kHz in a thread: publishes ten rows every 10 ms and applies commands to its config.
 
     It answers while `answers` is set.
     """
@@ -65,7 +65,7 @@ class Daemon:
         rows = np.zeros(10, self.row)
         topic = self.config.name.encode()
         for first in itertools.count(0, 10):
-            out.socket.send_multipart([topic, *([b"junk"] * (first // 10 % 3))])  # must not disturb the scope
+            out.socket.send_multipart([topic, *([b"junk"] * (first // 10 % 3))])  # junk that the scope must ignore
             rows["tick"] = np.arange(first, first + 10)
             rows["t"] = rows["tick"] / 1000.0
             out.publish(rows)
@@ -86,7 +86,7 @@ def daemon(runtime, config, rows):
 
 
 def serving(daemon, folder, work, control=False, say=lambda _: None):
-    """Run `work(scope, session)` beside a server; the session holds the token. `say` hears what is waited for."""
+    """Run `work(scope, session)` with a server; the session has the token. `say` receives the waiting messages."""
 
     async def main():
         feed, guard = Feed(daemon.config.name), Guard(folder)
@@ -111,7 +111,7 @@ def serving(daemon, folder, work, control=False, say=lambda _: None):
 
 
 class Page:
-    """What the page does with a WebSocket."""
+    """WebSocket client with the behaviour of the page."""
 
     def __init__(self, socket):
         self.socket = socket
@@ -145,7 +145,7 @@ async def page(scope, session):
         yield Page(socket)
 
 
-def test_frames_and_status_reach_two_viewers_each_with_its_view(daemon, tmp_path):
+def test_two_viewers_get_frames_of_their_views_and_the_status(daemon, tmp_path):
     async def work(scope, session):
         async with page(scope, session) as one, page(scope, session) as two:
             await one.look()
@@ -159,7 +159,7 @@ def test_frames_and_status_reach_two_viewers_each_with_its_view(daemon, tmp_path
 
 
 @pytest.mark.parametrize("op", ["arm", "disarm", "reset", "play", "setpoint", "set"])
-def test_read_only_is_read_only_whatever_the_page_sends(daemon, tmp_path, op):
+def test_read_only_server_refuses_every_command(daemon, tmp_path, op):
     async def work(scope, session):
         async with page(scope, session) as viewer:
             reply = await viewer.ask(op, value=1.0)
@@ -170,13 +170,13 @@ def test_read_only_is_read_only_whatever_the_page_sends(daemon, tmp_path, op):
     assert {op for op, _ in daemon.seen} <= {"status", "signals", "get"}
 
 
-def test_with_control_the_daemon_judges(daemon, tmp_path):
+def test_commands_with_control_are_judged_by_the_daemon(daemon, tmp_path):
     async def work(scope, session):
         async with page(scope, session) as viewer:
             assert (await viewer.ask("set", path="law.position.gain", value="30 V/rad"))["ok"]
             settings = (await viewer.until("hello", run=1))["settings"]
             while {row["path"]: row["value"] for row in settings}.get("law.position.gain") != 30.0:
-                settings = (await viewer.until("hello"))["settings"]  # somebody changed it: all pages are told
+                settings = (await viewer.until("hello"))["settings"]  # a change is sent to all pages
             refused = await viewer.ask("set", path="law.position.gain", value=-3.0)
             assert "law.position.gain: -3.0 V/rad is out of bounds: it must be at least 0 V/rad" in refused["error"]
             assert "'setpoint' needs the argument 'value'" in (await viewer.ask("setpoint"))["error"]
@@ -198,7 +198,7 @@ def test_with_control_the_daemon_judges(daemon, tmp_path):
         '{"op": "view", "view": {"window": NaN}}',
     ],
 )
-def test_whatever_comes_is_answered(daemon, tmp_path, text):
+def test_every_message_is_answered(daemon, tmp_path, text):
     async def work(scope, session):
         async with page(scope, session) as viewer:
             await viewer.socket.send_str(text)
@@ -224,7 +224,7 @@ def test_whatever_comes_is_answered(daemon, tmp_path, text):
         ("/static/main.js", {"Cookie": ""}, "?token="),
     ],
 )
-def test_other_pages_and_other_accounts_are_refused(daemon, tmp_path, path, headers, message):
+def test_other_origins_and_wrong_tokens_are_refused(daemon, tmp_path, path, headers, message):
     async def work(scope, session):
         port = scope.guard.port
         asked = {"Host": f"127.0.0.1:{port}", "Cookie": f"{scope.guard.cookie}={scope.guard.token}"}
@@ -243,7 +243,7 @@ def test_other_pages_and_other_accounts_are_refused(daemon, tmp_path, path, head
     serving(daemon, tmp_path, work, control=True)
 
 
-def test_the_page_and_its_parts_are_served_and_nothing_else(daemon, tmp_path):
+def test_only_the_page_and_its_parts_are_served(daemon, tmp_path):
     async def work(scope, session):
         for path in ("/", "/static/main.js", "/static/uplot/uPlot.iife.min.js", "/static/uplot/LICENSE"):
             assert (await session.get(path)).status == 200
@@ -253,7 +253,7 @@ def test_the_page_and_its_parts_are_served_and_nothing_else(daemon, tmp_path):
     serving(daemon, tmp_path, work)
 
 
-def test_there_is_a_bound_to_viewers(daemon, tmp_path):
+def test_number_of_viewers_is_bounded(daemon, tmp_path):
     async def work(scope, session):
         async with contextlib.AsyncExitStack() as stack:
             for _ in range(MOST_VIEWERS):
@@ -264,7 +264,7 @@ def test_there_is_a_bound_to_viewers(daemon, tmp_path):
     serving(daemon, tmp_path, work)
 
 
-def test_another_daemon_of_the_name_is_taken_up(runtime, config, rows, tmp_path, monkeypatch):
+def test_scope_reconnects_to_a_new_daemon_of_the_name(runtime, config, rows, tmp_path, monkeypatch):
     settings = config("ivu")
     first, second = (Daemon(settings, rows(0, 1).dtype) for _ in range(2))
 
@@ -287,8 +287,8 @@ def test_another_daemon_of_the_name_is_taken_up(runtime, config, rows, tmp_path,
         second._thread.join()
 
 
-def test_the_scope_may_be_first(runtime, config, rows, tmp_path):
-    """Then the daemon comes, at first as one that compiles its tick: its sockets are there and nobody answers."""
+def test_scope_may_start_before_the_daemon(runtime, config, rows, tmp_path):
+    """The daemon starts later. During its compilation the sockets exist, but requests are not answered."""
     late, said = Daemon(config("ivu"), rows(0, 1).dtype), []
     late.answers.clear()
 
@@ -316,7 +316,7 @@ def test_the_scope_may_be_first(runtime, config, rows, tmp_path):
     assert said == [f"{name} {ABSENT}", f"{name} {STARTING}", f"{name} answers"]
 
 
-def test_a_daemon_that_answers_needs_no_words(daemon, tmp_path):
+def test_answering_daemon_gives_no_waiting_message(daemon, tmp_path):
     said = []
 
     async def work(scope, session):
@@ -328,7 +328,7 @@ def test_a_daemon_that_answers_needs_no_words(daemon, tmp_path):
     assert said == []
 
 
-def test_a_port_that_is_taken(daemon, tmp_path):
+def test_port_in_use_is_an_error(daemon, tmp_path):
     async def work(scope, session):
         with pytest.raises(UserError, match="is in use; choose another"):
             await Scope(scope.feed, Guard(tmp_path)).serve(scope.guard.port)

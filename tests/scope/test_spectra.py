@@ -10,7 +10,7 @@ from rtctl.scope.viewer import SLOW, Viewer
 
 @pytest.fixture
 def computed(monkeypatch):
-    """How many signals were transformed, a number for each time."""
+    """Number of transformed signals of each call."""
     counts, real = [], spectra.lines
 
     def count(values):
@@ -27,7 +27,7 @@ def noise(t):
 
 
 @pytest.mark.parametrize(("rows_there", "asked"), [(3000, 1000), (700, 1000), (20_000, 100_000), (4, 1000)])
-def test_it_is_that_of_the_newest_rows(history, rows, rows_there, asked):
+def test_spectrum_is_that_of_the_newest_rows(history, rows, rows_there, asked):
     history.append(rows(0, rows_there, noise))
     f, level, there = Spectra().newest(history, ["u", "v"], asked, 1e-3, 50)
     assert there == min(rows_there, asked, LONGEST_SPECTRUM)
@@ -35,7 +35,7 @@ def test_it_is_that_of_the_newest_rows(history, rows, rows_there, asked):
     assert np.array_equal(f, expected[0]) and np.array_equal(level, expected[1])
 
 
-def test_each_signal_is_computed_once_for_all_who_ask_and_anew_with_new_rows(history, rows, computed):
+def test_spectrum_of_a_signal_is_shared_by_viewers_and_renewed_with_new_rows(history, rows, computed):
     shared = Spectra()
     history.append(rows(0, 3000, noise))
     one = shared.newest(history, ["u", "v"], 1000, 1e-3, 300)
@@ -49,7 +49,7 @@ def test_each_signal_is_computed_once_for_all_who_ask_and_anew_with_new_rows(his
     assert computed == [2, 1, 1, 1]
 
 
-def test_viewers_who_came_at_different_times_get_theirs_in_the_same_frame(history, rows, computed, unpack):
+def test_all_viewers_get_their_spectra_in_one_frame(history, rows, computed, unpack):
     shared = Spectra()
     viewers = [Viewer(shared) for _ in range(3)]
     frames = []

@@ -14,7 +14,7 @@ def found(config):
     return rows
 
 
-def test_values_units_and_bounds_are_those_of_the_config(found):
+def test_tunable_settings_have_values_units_and_bounds_of_the_config(found):
     ivu, ldu = found("ivu"), found("ldu")
     gain = ivu["law.position.gain"]
     assert (gain["value"], gain["unit"], gain["type"]) == (31.0, "V/rad", "number")
@@ -23,14 +23,14 @@ def test_values_units_and_bounds_are_those_of_the_config(found):
     assert ivu["safety.missed_ticks"]["type"] == "integer"
     assert ivu["safety.require_commander"]["type"] == "boolean"
     assert ivu["law.gain_schedule.mode"]["choices"][0] == "off"
-    assert ldu["law.limit.slew"]["value"] is None  # not set, and can be
+    assert ldu["law.limit.slew"]["value"] is None  # unset but settable
 
 
-def test_what_changes_the_structure_is_not_offered(found):
+def test_structural_settings_are_not_tunable(found):
     assert not [path for path in found("ldu") if path.endswith(".kind") or not path.startswith(("law.", "safety."))]
 
 
-def test_a_described_machine_has_its_own_units():
+def test_described_machine_has_the_units_of_its_description():
     settings = load_config("spindle", [])
     parts = {part: getattr(settings, part).model_dump(mode="json") for part in ("law", "safety")}
     rows = {row["path"]: row for row in tunable(settings.machine.model_dump(mode="json"), parts)}
@@ -38,5 +38,5 @@ def test_a_described_machine_has_its_own_units():
     assert rows["law.limit.high"]["unit"] == "V" and rows["law.position.tau_i"]["unit"] == "s"
 
 
-def test_a_machine_that_this_version_does_not_know_has_none():
+def test_unknown_machine_has_no_tunable_settings():
     assert tunable("loom", {"law": {"gain": 1.0}}) == []

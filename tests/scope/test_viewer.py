@@ -29,7 +29,7 @@ def noise(t):
 
 
 @pytest.mark.parametrize("slow", [False, True])
-def test_rolling_frames_hold_every_extreme_even_if_some_were_dropped(viewer, history, rows, unpack, slow):
+def test_rolling_frames_contain_every_extreme_despite_dropped_frames(viewer, history, rows, unpack, slow):
     look(viewer, signals=("u", "v"), window=10.0)
     got = []
     for turn in range(60):
@@ -52,7 +52,7 @@ def test_rolling_frames_hold_every_extreme_even_if_some_were_dropped(viewer, his
     assert np.array_equal(values, [*low, *high])
 
 
-def test_a_viewer_that_draws_nothing_gets_no_more_and_is_counted(viewer, history, rows):
+def test_viewer_without_acknowledgement_gets_no_frames_and_is_counted(viewer, history, rows):
     look(viewer)
     frames = []
     for turn in range(10):
@@ -62,7 +62,7 @@ def test_a_viewer_that_draws_nothing_gets_no_more_and_is_counted(viewer, history
     assert viewer.dropped == 10 - OUTSTANDING
 
 
-def test_one_that_was_away_for_longer_than_the_window_gets_the_window(viewer, history, rows, unpack):
+def test_viewer_absent_longer_than_the_window_gets_the_window(viewer, history, rows, unpack):
     look(viewer)
     history.append(rows(0, 100))
     drawn(viewer)
@@ -72,11 +72,11 @@ def test_one_that_was_away_for_longer_than_the_window_gets_the_window(viewer, hi
     assert (t[0], t[-1]) == (pytest.approx(4.1), pytest.approx(5.09))
 
 
-def test_a_sweep_starts_before_its_crossing(viewer, history, rows, unpack):
+def test_sweep_starts_before_its_crossing(viewer, history, rows, unpack):
     trigger = {"mode": "normal", "signal": "u", "level": 0.5, "pre": 0.25}
     look(viewer, trigger=trigger, window=0.1, columns=200)
     history.append(rows(0, 1050, lambda t: t >= 1.0))
-    assert drawn(viewer) is None  # the sweep is not full
+    assert drawn(viewer) is None  # incomplete sweep
     history.append(rows(1050, 50, lambda t: t >= 1.0))
     about, (t, u) = unpack(viewer.frame())
     assert (about["kind"], about["sweep"], about["sweeps"]) == ("picture", True, 1)
@@ -84,7 +84,7 @@ def test_a_sweep_starts_before_its_crossing(viewer, history, rows, unpack):
     assert u.tolist() == [0.0] * 25 + [1.0] * 75
 
 
-def test_auto_rolls_where_there_is_no_crossing(viewer, history, rows, unpack):
+def test_auto_mode_rolls_without_a_crossing(viewer, history, rows, unpack):
     trigger = {"mode": "auto", "signal": "u", "level": 0.5}
     look(viewer, trigger=trigger, window=0.1)
     history.append(rows(0, 200, lambda t: t >= 0.1))
@@ -96,23 +96,23 @@ def test_auto_rolls_where_there_is_no_crossing(viewer, history, rows, unpack):
     assert (kinds[0], kinds[-1]) == ("picture", "roll")
 
 
-def test_what_is_held_can_be_looked_at_closely_long_after_it_was_overwritten(viewer, history, rows, unpack):
+def test_held_rows_can_be_zoomed_after_they_are_overwritten(viewer, history, rows, unpack):
     look(viewer, window=2.0)
     history.append(rows(0, 5000, noise))
     drawn(viewer)
-    expected = history.take(("t", "v"), 4000, 4011)  # one more on either side
+    expected = history.take(("t", "v"), 4000, 4011)  # one additional row on either side
     look(viewer, window=2.0, hold=True)
     history.append(rows(5000, 40_000))
     about, arrays = unpack(drawn(viewer))
     assert (about["held"], about["bucket"]) == (True, 20)
-    assert drawn(viewer) is None  # nothing new
+    assert drawn(viewer) is None  # no new frame
     look(viewer, window=2.0, hold=True, signals=("v",), span=(4.001, 4.009))
     about, arrays = unpack(drawn(viewer))
     assert about["bucket"] == 1
     assert np.array_equal(arrays, expected)
 
 
-def test_a_single_sweep_stays_whatever_comes_after_it(viewer, history, rows, unpack):
+def test_single_sweep_stays_shown(viewer, history, rows, unpack):
     trigger = {"mode": "single", "signal": "u", "level": 0.5, "pre": 0.5}
     look(viewer, trigger=trigger, window=0.1, columns=200)
     history.append(rows(0, 2000, lambda t: t >= 1.0))
@@ -124,22 +124,22 @@ def test_a_single_sweep_stays_whatever_comes_after_it(viewer, history, rows, unp
     look(viewer, trigger=trigger, window=0.1, columns=200, signals=("v",), hold=True, span=(0.0, 0.0105))
     assert unpack(drawn(viewer))[1][1].tolist() == list(range(-999, -1012, -1))
     look(viewer, trigger={**trigger, "armed": 1}, window=0.1, columns=200)
-    assert drawn(viewer) is None  # waits for the next
+    assert drawn(viewer) is None  # waits for the next crossing
 
 
-def test_other_pictures(viewer, history, rows, unpack):
+def test_xy_and_spectrum_views(viewer, history, rows, unpack):
     history.append(rows(0, 3000))
     look(viewer, kind="xy", x="v", signals=("u", "nothing"))
     frames = [frame for frame in (drawn(viewer) for _ in range(8)) if frame is not None]
     about, arrays = unpack(frames[0])
     assert (about["kind"], about["names"], arrays.shape) == ("xy", ["v", "u"], (2, 1000))
-    assert len(frames) == 4  # every other one
+    assert len(frames) == 4  # every second frame
     look(viewer, kind="spectrum")
     about, arrays = unpack(next(frame for frame in (drawn(viewer) for _ in range(8)) if frame is not None))
     assert (about["kind"], about["rows"], arrays.shape[0]) == ("spectrum", 1000, 2)
 
 
-def test_no_signals_are_no_trouble(viewer, history, rows):
+def test_view_without_signals_is_valid(viewer, history, rows):
     history.append(rows(0, 3000))
     for kind in ("time", "xy", "spectrum"):
         look(viewer, kind=kind, signals=())
@@ -160,6 +160,6 @@ def test_no_signals_are_no_trouble(viewer, history, rows):
         (7, "view"),
     ],
 )
-def test_a_view_that_makes_no_sense_is_refused(view, message):
+def test_invalid_view_is_refused(view, message):
     with pytest.raises(UserError, match=message):
         read_view(view, ("u", "t"))

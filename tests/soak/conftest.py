@@ -1,4 +1,4 @@
-"""Machines for short soaks, and a way to play only some of the events."""
+"""Fixtures: machines for short soaks, and restricted sets of events."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -22,7 +22,7 @@ def rig(config: Callable[..., Any], tmp_path: Path) -> Callable[..., Fused]:
 
 @pytest.fixture
 def only(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
-    """`only("fault", faults=["link.silent"])`: days of these events and faults alone."""
+    """`only("fault", faults=["link.silent"])`: soaks of these events and faults only."""
 
     def narrow(*kinds: str, faults: list[str] | None = None) -> None:
         monkeypatch.setattr(events, "WEIGHTS", dict.fromkeys(kinds, 1.0))

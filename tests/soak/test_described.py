@@ -1,4 +1,4 @@
-"""What a random day asks of a described machine follows from its own reference."""
+"""Random soak of a described machine: ranges of commands follow from its reference."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from rtctl.config.load import set_path
 from rtctl.soak import ranges
 
 
-def test_moves_are_those_of_the_reference():
+def test_random_moves_have_the_range_of_the_reference():
     config = load_config("belt", [])
     found = ranges.range_of(machines.build(config))
     assert found.travel == 12.0 and found.rate == pytest.approx((3.0, 15.0))
@@ -19,18 +19,18 @@ def test_moves_are_those_of_the_reference():
     assert set(ranges.gains_of(config)) == {"law.position.gain"}
 
 
-def test_commands_reach_the_limit_and_half_a_code():
+def test_random_commands_reach_the_limit_and_half_a_code():
     low, high = ranges.volts(load_config("belt", []))
     assert high == -low == pytest.approx(10.0 + 10.0 / 2**16)
     low, high = ranges.volts(load_config("two-motor", ["law.shares={servo2: 1.5}"]))
     assert high == pytest.approx(12.0, abs=1e-3)
 
 
-def test_a_machine_that_shows_no_counts_is_not_judged_by_them():
+def test_machine_without_counts_is_not_checked_for_lost_counts():
     assert np.isnan(ranges.counts_per_unit(load_config("spindle", [])))
 
 
-def test_a_day_needs_a_reference_to_go_by():
+def test_soak_needs_a_reference():
     still = set_path(load_config("belt", []), "reference", {})
     with pytest.raises(UserError, match="a soak moves as the reference does"):
         ranges.with_reference(still)

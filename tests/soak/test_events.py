@@ -1,4 +1,4 @@
-"""A day depends on its seed and the numbers of its events, and on nothing else."""
+"""Random events of a soak depend only on the seed and the event number."""
 
 from collections.abc import Callable
 from typing import Any
@@ -13,7 +13,7 @@ Make = Callable[..., Fused]
 
 
 def kinds(rig: Fused, seed: int, events: int) -> list[str]:
-    """Which events came, in their order."""
+    """Kinds of the events in order."""
     day, out = Day(rig, seed), []
     for _ in range(events):
         before = dict(day.events)
@@ -22,11 +22,11 @@ def kinds(rig: Fused, seed: int, events: int) -> list[str]:
     return out
 
 
-def test_events_are_those_of_the_seed_on_any_machine(rig: Make) -> None:
+def test_events_depend_only_on_the_seed_for_any_machine(rig: Make) -> None:
     assert kinds(rig("ivu"), 3, 6) == kinds(rig("axis"), 3, 6) != kinds(rig("axis"), 4, 6)
 
 
-def test_a_fault_is_one_that_the_tick_knows(rig: Make) -> None:
+def test_random_fault_is_supported_by_the_tick(rig: Make) -> None:
     day = Day(rig("ivu"), 1)
     seen = set()
     for number in range(400):
@@ -39,7 +39,7 @@ def test_a_fault_is_one_that_the_tick_knows(rig: Make) -> None:
     assert seen == set(KINDS) >= set(SIZES)
 
 
-def test_commands_stay_within_the_travel(rig: Make) -> None:
+def test_random_commands_stay_within_the_travel(rig: Make) -> None:
     machine = rig("axis")
     asked: list[float] = []
     setpoint = machine.setpoint
@@ -56,7 +56,7 @@ def test_commands_stay_within_the_travel(rig: Make) -> None:
     assert len(asked) > 15 and np.all(np.abs(asked) < most)
 
 
-def test_a_machine_that_tripped_is_brought_back_before_the_next_event(rig: Make, only: Callable[..., None]) -> None:
+def test_tripped_machine_is_reset_before_the_next_event(rig: Make, only: Callable[..., None]) -> None:
     only("move")
     machine = rig("ivu", seed=1)
     day = Day(machine, 1)
@@ -69,7 +69,7 @@ def test_a_machine_that_tripped_is_brought_back_before_the_next_event(rig: Make,
     assert machine.checker.last["state"] == safety.RUNNING and machine.checker.count == 0
 
 
-def test_each_kind_of_event_is_there(rig: Make) -> None:
+def test_each_kind_of_event_occurs(rig: Make) -> None:
     day: Any = Day(rig("axis"), 1)
     assert all(callable(getattr(day, f"_{kind}")) for kind in WEIGHTS)
     assert abs(sum(WEIGHTS.values()) - 1.0) < 1e-9

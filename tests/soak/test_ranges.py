@@ -1,4 +1,4 @@
-"""The table of what a day may ask: it names signals and settings that there are, and bounds that hold."""
+"""Table of soak ranges: existing signals and settings, and valid bounds."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -21,7 +21,7 @@ def settings(request: pytest.FixtureRequest, config: Callable[..., Any]) -> Any:
     return config(request.param)
 
 
-def test_signals_are_columns_of_the_row(settings: Any) -> None:
+def test_signals_of_the_ranges_are_columns_of_the_row(settings: Any) -> None:
     names = generate.generate(machines.build(settings), "shm").row.names or ()
     r = ranges.range_of(machines.build(settings))
     told = (r.position, r.error, *r.outputs, r.counts, r.truth, *r.tensions, *r.truth_tensions)
@@ -29,7 +29,7 @@ def test_signals_are_columns_of_the_row(settings: Any) -> None:
     assert len(r.tensions) == len(r.truth_tensions)
 
 
-def test_gains_are_settings_that_may_change_while_it_runs(settings: Any) -> None:
+def test_gains_of_the_ranges_may_change_while_running(settings: Any) -> None:
     gains = ranges.gains_of(settings)
     assert gains
     source = generate.source(machines.build(settings), "shm")
@@ -40,7 +40,7 @@ def test_gains_are_settings_that_may_change_while_it_runs(settings: Any) -> None
             assert generate.source(machines.build(changed), "shm") == source
 
 
-def test_a_law_of_another_kind_has_other_gains(config: Callable[..., Any]) -> None:
+def test_law_of_another_kind_has_other_gains(config: Callable[..., Any]) -> None:
     pd = config("axis", set={"law.position": {"kind": "pd", "gain": 30000.0, "tau_d": 0.01}})
     assert set(ranges.gains_of(pd)) == {"law.position.gain"}
 
@@ -52,7 +52,7 @@ def test_output_bounds_are_those_of_law_and_converter(config: Callable[..., Any]
     assert ranges.volts(config("axis", set={"law.limit": {"high": 40.0}})) == (-10.0 - half, 10.0 + half)
 
 
-def test_counts_are_compared_unless_a_term_stands_between(config: Callable[..., Any]) -> None:
+def test_counts_are_checked_unless_a_term_changes_the_sensor(config: Callable[..., Any]) -> None:
     assert ranges.counts_per_unit(config("axis")) == pytest.approx(1e6)
     terms = [{"term": "ripple.encoder", "node": "sensor", "A": 1e-6}]
     assert np.isnan(ranges.counts_per_unit(config("axis", set={"plant.physics": terms})))
@@ -67,7 +67,7 @@ def test_counts_are_compared_unless_a_term_stands_between(config: Callable[..., 
         ("ldu", {}, set()),
     ],
 )
-def test_what_an_own_plant_does_not_tell_is_not_asked_for(
+def test_signals_missing_in_a_user_plant_are_not_checked(
     tmp_path: Path, machine: str, without: dict[str, str], empty: set[str]
 ) -> None:
     main(["new", "plant", "mine", "--for", machine, "--into", str(tmp_path)])
@@ -83,14 +83,14 @@ def test_what_an_own_plant_does_not_tell_is_not_asked_for(
     assert np.isnan(ranges.counts_per_unit(own)) == (machine == "ldu")
 
 
-def test_an_fmu_tells_nothing_but_what_its_sensors_see(config: Callable[..., Any]) -> None:
+def test_only_sensor_signals_of_an_fmu_are_checked(config: Callable[..., Any]) -> None:
     fmu = FmuSettings(file="a.fmu", inputs={"drive": "u"}, outputs={"sensor": "x"})
     axis = config("axis")
     with_fmu = axis.model_copy(update={"plant": axis.plant.model_copy(update={"fmu": fmu})})
     assert ranges.unknown(with_fmu) == {"truth_x", "truth_speed"} and ranges.unknown(axis) == set()
 
 
-def test_a_config_keeps_its_own_reference(settings: Any) -> None:
+def test_soak_keeps_the_reference_of_the_config(settings: Any) -> None:
     given = ranges.with_reference(settings)
     assert len(given.reference.knots) > 1
     assert ranges.with_reference(given) is given

@@ -1,4 +1,4 @@
-"""Summary, JUnit XML and the words of a soak."""
+"""Summary, JUnit XML and console text of a soak."""
 
 import json
 from collections.abc import Callable
@@ -16,7 +16,7 @@ from rtctl.soak.rig import Fused
 
 @pytest.fixture
 def found(rig: Callable[..., Fused], tmp_path: Path) -> dict[str, Any]:
-    """Of one event, with two violations by hand."""
+    """Result of one event with two manual violations."""
     machine = rig("axis", seed=7)
     day = Day(machine, 7)
     day.step()
@@ -26,7 +26,7 @@ def found(rig: Callable[..., Fused], tmp_path: Path) -> dict[str, Any]:
     return report.summary(day, 1.5, 200.0, "fused", tmp_path)
 
 
-def test_the_summary_counts_and_tells(found: dict[str, Any]) -> None:
+def test_summary_counts_events_and_violations(found: dict[str, Any]) -> None:
     assert found["violations"] == 2 and found["violated"] == {"memory": 1, "recovery": 1}
     assert [v["name"] for v in found["violation_list"]] == ["memory", "recovery"]
     assert all(v["seed"] == 7 and v["signals"] and v["bundle"] for v in found["violation_list"])
@@ -34,7 +34,7 @@ def test_the_summary_counts_and_tells(found: dict[str, Any]) -> None:
     assert found["invariants"]["finite"] == found["ticks"] > 0
 
 
-def test_a_violation_by_what_is_no_number_can_be_written(rig: Callable[..., Fused], tmp_path: Path) -> None:
+def test_violation_with_nan_is_valid_json(rig: Callable[..., Fused], tmp_path: Path) -> None:
     machine = rig("axis", seed=7)
     day = Day(machine, 7)
     day.step()
@@ -58,7 +58,7 @@ def test_junit_has_a_test_case_for_each_invariant(found: dict[str, Any], tmp_pat
     assert not list(cases["finite"])
 
 
-def test_words_name_what_did_not_hold(found: dict[str, Any]) -> None:
+def test_console_text_names_the_violated_invariants(found: dict[str, Any]) -> None:
     lines = report.words(found)
     assert sum(line.startswith("FAIL") for line in lines) == 2
     assert any(line.startswith("memory at tick 12, event 0 of seed 7") for line in lines)

@@ -1,4 +1,4 @@
-"""A machine under a service manager that is only a socket: start, signs of life, reload and stop."""
+"""A machine under a stubbed service manager: start, watchdog, reload and stop."""
 
 import json
 import os
@@ -23,7 +23,7 @@ WATCHDOG = 200_000  # us
 
 
 class Manager:
-    """Listens at NOTIFY_SOCKET and keeps every message with the pid of its sender."""
+    """Stub of a service manager: listens at NOTIFY_SOCKET and keeps every message with the pid of its sender."""
 
     def __init__(self, path: Path):
         self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
@@ -34,7 +34,7 @@ class Manager:
         self.pids: set[int] = set()
 
     def next(self, word: str, seconds: float = 60.0) -> str:
-        """Wait for the next message that has `word`; returns it."""
+        """Wait for the next message with `word`; returns the message."""
         deadline = time.monotonic() + seconds
         while True:
             for i, message in enumerate(self.messages):
@@ -65,14 +65,14 @@ def manager(runtime: Path) -> Iterator[Manager]:
 
 
 def stretch(usec: int) -> Iterator[None]:
-    """As many items as are asked for in that time."""
+    """Up to `count` items within a time."""
     end = time.monotonic_ns() + 1000 * usec
     while time.monotonic_ns() < end:
         yield
 
 
 class Running:
-    """`rtctl` as a service manager starts it, with a config file of its own."""
+    """`rtctl` started as by a service manager, with a separate config file."""
 
     def __init__(self, command: str, manager: Manager, folder: Path, options: tuple[str, ...], **keys: Any):
         self.config = yaml.safe_load(CONFIG.read_text()) | {"name": f"s{os.getpid()}-{time.monotonic_ns() % 10**8}"}
@@ -98,7 +98,7 @@ class Running:
         return next(int(pid) for pid in children if role in Path(f"/proc/{pid}/cmdline").read_text())
 
     def end(self) -> str:
-        """Stop as KillMode=control-group does it; returns what was said."""
+        """Stop as with KillMode=control-group; returns the output."""
         children = Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children").read_text().split()
         for pid in (*map(int, children), self.process.pid):
             os.kill(pid, signal.SIGTERM)
@@ -123,7 +123,7 @@ def start(manager: Manager, tmp_path: Path) -> Iterator[Callable[..., Running]]:
 SERVICE = ("--no-arm", "--no-plot", "--json", "--out")
 
 
-def test_start_reload_and_stop(manager: Manager, start: Callable[..., Running], tmp_path: Path) -> None:
+def test_service_starts_reloads_and_stops(manager: Manager, start: Callable[..., Running], tmp_path: Path) -> None:
     machine = start("run", *SERVICE, str(tmp_path / "bundle"))
     manager.next("READY=1", 200)
     assert machine.call("status")["ticks"] >= 100
@@ -157,7 +157,7 @@ def test_start_reload_and_stop(manager: Manager, start: Callable[..., Running], 
     assert [(c["path"], c["value"]) for c in case["changes"]] == [("law.position.gain", 20.0)]
 
 
-def test_a_loop_that_stands_still_gives_no_sign_of_life(
+def test_stopped_loop_sends_no_watchdog_message(
     manager: Manager, start: Callable[..., Running], tmp_path: Path
 ) -> None:
     machine = start("run", *SERVICE, str(tmp_path / "bundle"))
@@ -167,9 +167,9 @@ def test_a_loop_that_stands_still_gives_no_sign_of_life(
     os.kill(loop, signal.SIGSTOP)
     try:
         ticks = [machine.call("status")["ticks"] for _ in stretch(WATCHDOG)]
-        manager.take().clear()  # there may be one more, for the ticks before the stop
+        manager.take().clear()  # one more message is possible, for the ticks before the stop
         ticks += [machine.call("status")["ticks"] for _ in stretch(3 * WATCHDOG)]
-        assert len(set(ticks)) == 1  # the supervisor lives and takes its turns, the loop does not
+        assert len(set(ticks)) == 1  # the supervisor runs, the loop does not tick
         assert "WATCHDOG=1" not in manager.take()
     finally:
         os.kill(loop, signal.SIGCONT)
@@ -177,14 +177,16 @@ def test_a_loop_that_stands_still_gives_no_sign_of_life(
     machine.end()
 
 
-def test_a_config_that_is_wrong_is_never_ready(manager: Manager, start: Callable[..., Running], tmp_path: Path) -> None:
+def test_service_with_an_invalid_config_is_never_ready(
+    manager: Manager, start: Callable[..., Running], tmp_path: Path
+) -> None:
     machine = start("run", *SERVICE, str(tmp_path / "bundle"), law={"nonsense": 1})
     out, _ = machine.process.communicate(timeout=60)
     assert machine.process.returncode == 2 and "nonsense" in out
     assert not manager.take()
 
 
-def test_a_short_fused_run_is_ready_and_then_stops(
+def test_short_fused_run_is_ready_and_then_stops(
     manager: Manager, start: Callable[..., Running], tmp_path: Path
 ) -> None:
     machine = start("run", "--mode", "fused", "--for", "1s", *SERVICE, str(tmp_path / "bundle"))
@@ -194,7 +196,7 @@ def test_a_short_fused_run_is_ready_and_then_stops(
     assert machine.process.returncode == 0, out
 
 
-def test_a_plant_is_ready_when_it_listens(manager: Manager, start: Callable[..., Running], runtime: Path) -> None:
+def test_plant_is_ready_when_it_listens(manager: Manager, start: Callable[..., Running], runtime: Path) -> None:
     plant = start("plant", "--endpoint", f"ipc://{runtime}/plant-{time.monotonic_ns()}")
     assert "STATUS=listens at ipc://" in manager.next("READY=1", 200)
     out = plant.end()

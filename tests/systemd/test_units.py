@@ -1,4 +1,4 @@
-"""The unit files, as systemd itself judges them, where it is installed."""
+"""Unit files checked by systemd, if installed."""
 
 import re
 import shutil
@@ -27,7 +27,7 @@ def version() -> int:
 
 
 def unit(name: str) -> dict[str, list[str]]:
-    """Settings of the [Service] section, each with all of its values."""
+    """Settings of the [Service] section, each with all values."""
     lines = (FOLDER / name).read_text().partition("[Service]")[2].partition("\n[")[0].splitlines()
     found: dict[str, list[str]] = {}
     for line in lines:
@@ -38,8 +38,8 @@ def unit(name: str) -> dict[str, list[str]]:
 
 
 @pytest.mark.parametrize("name", UNITS)
-def test_verify_has_nothing_to_say(name: str, tmp_path: Path) -> None:
-    """The program is that of this environment, since /usr/bin may have none."""
+def test_systemd_verify_finds_no_error(name: str, tmp_path: Path) -> None:
+    """The program path is that of this environment, since /usr/bin may lack the program."""
     program = Path(sys.executable).with_name("rtctl")
     if not program.exists():
         pytest.skip(f"there is no {program}")
@@ -51,7 +51,7 @@ def test_verify_has_nothing_to_say(name: str, tmp_path: Path) -> None:
     assert said == [] and run.returncode == 0
 
 
-def test_verify_would_find_a_wrong_line(tmp_path: Path) -> None:
+def test_systemd_verify_finds_an_invalid_line(tmp_path: Path) -> None:
     copy = tmp_path / UNITS[0]
     copy.write_text((FOLDER / UNITS[0]).read_text().replace("WatchdogSec=", "WatchdogSecs="))
     run = subprocess.run([tool("systemd-analyze"), "verify", str(copy)], capture_output=True, text=True, check=False)
@@ -59,7 +59,7 @@ def test_verify_would_find_a_wrong_line(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", UNITS)
-def test_security_is_no_worse_than_it_may_be(name: str) -> None:
+def test_exposure_level_is_within_its_limit(name: str) -> None:
     command = [
         tool("systemd-analyze"),
         "security",
@@ -73,7 +73,7 @@ def test_security_is_no_worse_than_it_may_be(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", UNITS)
-def test_what_a_compiled_tick_cannot_live_with_is_not_asked_for(name: str) -> None:
+def test_restrictions_that_break_a_compiled_tick_are_absent(name: str) -> None:
     settings = unit(name)
     assert "MemoryDenyWriteExecute" not in settings
     assert settings["Environment"] == ["RTCTL_CACHE_DIR=/var/cache/rtctl"] and settings["CacheDirectory"] == ["rtctl"]
@@ -81,7 +81,7 @@ def test_what_a_compiled_tick_cannot_live_with_is_not_asked_for(name: str) -> No
     assert "~@resources" not in calls and "~@memlock" not in calls
 
 
-def test_the_loop_may_become_fifo_and_lock_its_memory() -> None:
+def test_loop_may_use_fifo_and_lock_its_memory() -> None:
     settings = unit("rtctl@.service")
     assert settings["LimitRTPRIO"] == ["99"] and settings["LimitMEMLOCK"] == ["infinity"]
     assert settings["LimitNOFILE"] == ["65536"]
@@ -89,37 +89,37 @@ def test_the_loop_may_become_fifo_and_lock_its_memory() -> None:
     assert "/dev/cpu_dma_latency rw" in settings["DeviceAllow"]
 
 
-def test_every_process_gets_the_signal_that_puts_outputs_to_zero() -> None:
+def test_every_process_gets_the_signal_that_zeroes_the_outputs() -> None:
     settings = unit("rtctl@.service")
     assert settings["KillMode"] == ["control-group"] and settings["WatchdogSignal"] == ["SIGTERM"]
     assert "KillSignal" not in settings
 
 
-def test_only_the_main_process_speaks_and_reload_is_known() -> None:
+def test_only_the_main_process_notifies_and_reload_is_configured() -> None:
     settings = unit("rtctl@.service")
     assert settings["Type"] == ["notify", "notify-reload"] and settings["NotifyAccess"] == ["main"]
-    assert "ExecReload" not in settings  # with notify-reload the manager sends SIGHUP by itself
+    assert "ExecReload" not in settings  # with notify-reload the manager sends SIGHUP
 
 
-def test_nothing_recorded_is_moved_or_removed() -> None:
+def test_recordings_are_never_moved_or_removed() -> None:
     settings = unit("rtctl@.service")
     assert not {"ExecStartPre", "ExecStopPost"} & settings.keys() and "--out" not in settings["ExecStart"][0]
     lines = [line.split() for line in _lines("rtctl.tmpfiles")]
-    assert all(words[-1] == "-" for words in lines if words[0] == "d")  # no age
+    assert all(words[-1] == "-" for words in lines if words[0] == "d")  # no age limit
     assert not [words for words in lines if words[0][0] in "rRD"]
 
 
 @pytest.mark.parametrize("name", UNITS)
-def test_folders_agree_with_tmpfiles(name: str) -> None:
-    """Two that disagreed would change the mode of a folder back and forth."""
+def test_folder_modes_agree_with_tmpfiles(name: str) -> None:
+    """Different modes would change a folder back and forth."""
     settings = unit(name)
     modes = {words[1]: words[2] for words in map(str.split, _lines("rtctl.tmpfiles"))}
     for key, base in (("RuntimeDirectory", "/run"), ("StateDirectory", "/var/lib"), ("CacheDirectory", "/var/cache")):
         assert settings[f"{key}Mode"] == [modes[f"{base}/{settings[key][0]}"]]
-    assert settings["RuntimeDirectoryPreserve"] == ["yes"]  # other machines have their sockets there
+    assert settings["RuntimeDirectoryPreserve"] == ["yes"]  # shared with the sockets of other machines
 
 
-def test_sysusers_makes_the_account(tmp_path: Path) -> None:
+def test_sysusers_creates_the_account(tmp_path: Path) -> None:
     command = [tool("systemd-sysusers"), f"--root={tmp_path}", str(FOLDER / "rtctl.sysusers")]
     (tmp_path / "etc").mkdir()
     run = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -131,9 +131,9 @@ def test_sysusers_makes_the_account(tmp_path: Path) -> None:
     assert {unit(name)[key][0] for name in UNITS for key in ("User", "Group")} == {"rtctl"}
 
 
-def test_tmpfiles_makes_the_folders(tmp_path: Path) -> None:
-    """In a tree of its own that has the account."""
-    test_sysusers_makes_the_account(tmp_path)
+def test_tmpfiles_creates_the_folders(tmp_path: Path) -> None:
+    """In a temporary tree with the account."""
+    test_sysusers_creates_the_account(tmp_path)
     command = [tool("systemd-tmpfiles"), f"--root={tmp_path}", "--create", str(FOLDER / "rtctl.tmpfiles")]
     run = subprocess.run(command, capture_output=True, text=True, check=False)
     if "Operation not permitted" in run.stderr:

@@ -1,4 +1,4 @@
-"""Real statuses of both machines, and a console of any width."""
+"""Fixtures: real statuses of both machines, and a console of any width."""
 
 import io
 from collections.abc import Callable
@@ -15,7 +15,7 @@ from rtctl.terminal.traces import Traces
 
 
 class Picture(NamedTuple):
-    """What a panel is made of."""
+    """Arguments of a panel."""
 
     status: dict[str, Any]
     law: dict[str, Any]
@@ -28,7 +28,7 @@ class Picture(NamedTuple):
 
 @pytest.fixture(params=["ivu", "ldu"], scope="module")
 def picture(request: Any, served: Callable[..., Any], config: Callable[..., Any]) -> Picture:
-    """A machine on its way to a setpoint."""
+    """A machine during a move to a setpoint."""
     machine = served(config(request.param))
     machine.bench.ask("arm")
     machine.run(1.0)
@@ -43,7 +43,7 @@ def picture(request: Any, served: Callable[..., Any], config: Callable[..., Any]
 
 @pytest.fixture
 def draw() -> Callable[..., list[str]]:
-    """`draw(renderable, width)` gives the lines as a terminal of that width gets them."""
+    """`draw(renderable, width)`: lines for a terminal of the given width."""
 
     def drawn(what: Any, width: int, height: int = 50, encoding: str = "utf-8", **options: Any) -> list[str]:
         buffer = io.TextIOWrapper(io.BytesIO(), encoding, write_through=True)
@@ -58,7 +58,7 @@ def draw() -> Callable[..., list[str]]:
 
 @pytest.fixture
 def rtctl(runtime: Path, capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
-    """`rtctl("run", "ivu")` gives the exit code and what was printed."""
+    """`rtctl("run", "ivu")` returns exit code and output."""
 
     def call(*words: Any) -> tuple[int, str, str]:
         code = main([str(word) for word in words])

@@ -1,4 +1,4 @@
-"""A stream whose reader has gone takes everything, and says that it is gone."""
+"""Output stream with a closed reader: writes are discarded, and `gone` is set."""
 
 import io
 import os
@@ -6,23 +6,23 @@ import os
 from rtctl.terminal.outlet import Outlet
 
 
-def test_it_passes_on_what_is_written() -> None:
+def test_outlet_passes_text_to_the_stream() -> None:
     stream = io.StringIO()
     outlet = Outlet(stream)
     assert outlet.write("abc") == 3 and stream.getvalue() == "abc" and not outlet.gone
 
 
-def test_a_pipe_without_a_reader() -> None:
+def test_pipe_without_a_reader_discards_output() -> None:
     reads, writes = os.pipe()
     with os.fdopen(writes, "w", buffering=1) as stream:
         os.close(reads)
         outlet = Outlet(stream)
         assert outlet.write("abc\n") == 4 and outlet.gone
         outlet.flush()
-        assert outlet.write("more") == 4  # nor does closing raise what waits in the buffer
+        assert outlet.write("more") == 4  # closing does not raise for buffered text
 
 
-def test_a_stream_that_was_closed_here() -> None:
+def test_closed_stream_discards_output() -> None:
     stream = io.StringIO()
     stream.close()
     outlet = Outlet(stream)

@@ -1,4 +1,4 @@
-"""The panel on real statuses: what it says, and that it fits whatever the terminal is like."""
+"""Panel on real statuses: content, and fit to any terminal."""
 
 import pytest
 from rich.cells import cell_len
@@ -14,7 +14,7 @@ def test_no_line_is_wider_than_the_terminal_at_any_width(picture, draw, width):
     assert max(cell_len(line.rstrip()) for line in lines) <= min(width, WIDEST)
 
 
-def test_forty_columns_keep_what_matters_most(picture, draw):
+def test_panel_of_forty_columns_keeps_the_most_important_parts(picture, draw):
     lines = draw(picture.panel(left=7.0), 40)
     assert "running" in lines[0] and "7 s left" in lines[0]
     assert "Hz" not in lines[0]  # less important
@@ -26,7 +26,7 @@ def test_forty_columns_keep_what_matters_most(picture, draw):
     assert any(line.startswith("ticks") and "0 missed" in line for line in lines)
 
 
-def test_wide_terminals_see_reference_limits_and_bars(picture, draw):
+def test_wide_panel_shows_reference_limits_and_bars(picture, draw):
     lines = draw(picture.panel(), 100)
     heads = next(line for line in lines if "measured" in line)
     assert "reference" in heads and "error" in heads
@@ -38,7 +38,7 @@ def test_wide_terminals_see_reference_limits_and_bars(picture, draw):
     assert reference - measured == pytest.approx(error, abs=2e-4)
 
 
-def test_numbers_are_those_of_the_status(picture, draw):
+def test_panel_numbers_are_those_of_the_status(picture, draw):
     s = picture.status["signals"]
     text = "\n".join(draw(picture.panel(), 100))
     if "capstan" in s:
@@ -50,27 +50,27 @@ def test_numbers_are_those_of_the_status(picture, draw):
 
 
 @pytest.mark.parametrize("width", [30, 40, 120])
-def test_the_cause_of_a_trip_is_told_in_full(picture, draw, width):
+def test_panel_shows_the_full_cause_of_a_trip(picture, draw, width):
     lines = draw(picture.panel(state="tripped", trip=TRIP), width)
     assert "tripped at tick 812, following_error: the machine is too far from its reference" in " ".join(
         line.strip() for line in lines
     )
 
 
-def test_a_low_terminal_keeps_state_trip_and_signals(picture, draw):
+def test_low_terminal_keeps_state_trip_and_signals(picture, draw):
     lines = draw(picture.panel(state="tripped", trip=TRIP, lacks=["memory"]), 100, height=6)
     assert len(lines) == 5
     assert "tripped" in lines[0] and "tick 812" in lines[1]
     assert not any("memory" in line or "tick time" in line for line in lines)
 
 
-def test_lost_rows_and_a_full_disk_are_not_left_out(picture, draw):
+def test_panel_always_shows_lost_rows_and_a_full_disk(picture, draw):
     rows = {"lost_in_ring": 3, "recorded": 10, "queued": 0, "lost": 4, "error": "No space left on device"}
     lines = draw(picture.panel(rows=rows), 80, height=9)
     assert any("7 lost" in line and "No space left on device" in line for line in lines)
 
 
-def test_lateness_is_told_on_the_wall_clock_alone(picture, draw):
+def test_lateness_is_shown_in_real_mode_only(picture, draw):
     assert not any("lateness" in line for line in draw(picture.panel(), 100))
     late = {"p50": 12.0, "p99": 20.0, "p999": 55.0, "max": 1234.0}
     lines = draw(picture.panel(mode="real", lateness_us=late), 100)
@@ -78,17 +78,17 @@ def test_lateness_is_told_on_the_wall_clock_alone(picture, draw):
     assert any("max 1234 us" in line for line in lines)
 
 
-def test_a_daemon_that_has_gone_is_told_in_the_first_line(picture, draw):
+def test_first_line_shows_a_lost_daemon(picture, draw):
     assert "ivu has ended" in draw(picture.panel(gone="ivu has ended; waiting"), 60)[0]
 
 
-def test_ascii_where_the_terminal_knows_no_more(picture, draw):
+def test_panel_is_ascii_on_an_ascii_terminal(picture, draw):
     text = "".join(draw(picture.panel(left=1.0, trip=TRIP), 100, encoding="ascii"))
     assert text.isascii()
     assert "+-" in text and "@" in text
 
 
-def test_no_color_leaves_no_colour(picture, draw, monkeypatch):
+def test_no_color_setting_removes_all_colours(picture, draw, monkeypatch):
     panel = picture.panel(state="tripped", trip=TRIP)
     assert "\x1b[1;31m" in "".join(draw(panel, 80, color_system="standard"))
     monkeypatch.setenv("NO_COLOR", "1")
@@ -97,7 +97,7 @@ def test_no_color_leaves_no_colour(picture, draw, monkeypatch):
     assert " tripped " in text
 
 
-def test_an_output_at_its_limit_is_marked(picture, draw):
+def test_output_at_its_limit_is_marked(picture, draw):
     high = picture.law["limit"]["high"]
     signals = {**picture.status["signals"], "u": high, "u1": high}
     text = "".join(draw(picture.panel(signals=signals), 100, color_system="standard"))

@@ -1,4 +1,4 @@
-"""`rtctl run` at a terminal, a dumb one, and none."""
+"""`rtctl run` on a terminal, on a dumb terminal, and on a pipe."""
 
 import fcntl
 import os
@@ -12,11 +12,11 @@ import pyte
 import pytest
 
 COLUMNS, ROWS = 70, 24
-LONG = "120s"  # six times what the ring holds: the supervisor takes many turns, however fast the loop is
+LONG = "120s"  # six times the capacity of the ring: the supervisor needs many turns
 
 
 def run(tmp_path, runtime, *words, **environment):
-    """What a run of the reel unit sends to a terminal of COLUMNS x ROWS, and its exit code."""
+    """Output of a run of the reel unit on a terminal of COLUMNS x ROWS, and its exit code."""
     ours, theirs = pty.openpty()
     fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("4H", ROWS, COLUMNS, 0, 0))
     command = [sys.executable, "-m", "rtctl.cli.main", "run", "ivu", "--mode", "fused", "--for", LONG, "--no-plot"]
@@ -42,10 +42,10 @@ def first(lines):
     return next(k for k, line in enumerate(lines) if line.startswith(f"pty{os.getpid()}"))
 
 
-def test_a_panel_that_leaves_a_summary_behind(tmp_path, runtime):
+def test_panel_is_replaced_by_a_summary(tmp_path, runtime):
     code, data = run(tmp_path, runtime, "--reference", "steps", NO_COLOR="1")
     assert code == 0
-    assert b"|error|" in data  # the panel was there
+    assert b"|error|" in data  # the panel was shown
     assert not any(f"\x1b[{colour}m".encode() in data for colour in (31, 32, 41, 42))
     screen = pyte.Screen(COLUMNS, ROWS)
     pyte.ByteStream(screen).feed(data)
@@ -56,11 +56,11 @@ def test_a_panel_that_leaves_a_summary_behind(tmp_path, runtime):
     assert lines[summary].startswith(f"pty{os.getpid()}  60000 ticks at 500 Hz, fused: 0 missed")
     assert lines[summary + 1].split()[:2] == ["t", "[s]"]
     assert any(line.startswith("bundle") for line in lines)
-    assert not any("|error|" in line for line in lines)  # and has gone
+    assert not any("|error|" in line for line in lines)  # and is cleared
     assert not screen.cursor.hidden
 
 
-def test_a_dumb_terminal_gets_lines(tmp_path, runtime):
+def test_dumb_terminal_gets_plain_lines(tmp_path, runtime):
     code, data = run(tmp_path, runtime, TERM="dumb")
     assert code == 0
     assert b"\x1b[2K" not in data and b"\x1b[1A" not in data and b"\x1b[?25l" not in data
@@ -68,7 +68,7 @@ def test_a_dumb_terminal_gets_lines(tmp_path, runtime):
 
 
 @pytest.mark.parametrize("json", [False, True])
-def test_a_pipe_gets_no_control_characters(rtctl, tmp_path, json):
+def test_pipe_gets_no_control_characters(rtctl, tmp_path, json):
     words = ["run", "ivu", "--mode", "fused", "--for", "1s", "--no-plot", "--out", tmp_path / "bundle"]
     code, out, err = rtctl(*words, "--set", f"name=pipe{os.getpid()}", *(["--json"] if json else []))
     assert code == 0

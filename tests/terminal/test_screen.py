@@ -1,4 +1,4 @@
-"""A picture at the bottom, lines above it, and nobody who waits for the terminal."""
+"""Live display below scrolling lines; a slow terminal does not block."""
 
 import io
 import os
@@ -12,13 +12,13 @@ from rtctl.terminal.screen import Screen, takes_pictures
 
 
 def seen(data, columns=60, rows=20):
-    """The lines that a terminal shows after it was sent `data`."""
+    """Lines shown by a terminal after `data`."""
     screen = pyte.Screen(columns, rows)
     pyte.Stream(screen).feed(data.replace("\n", "\r\n"))
     return [line.rstrip() for line in screen.display]
 
 
-def test_messages_and_log_lines_stay_and_the_picture_goes():
+def test_messages_and_log_lines_stay_and_the_display_is_cleared():
     file = io.StringIO()
     console = Console(file=file, force_terminal=True, width=60)
     with Screen(console, "starting") as screen:
@@ -31,7 +31,7 @@ def test_messages_and_log_lines_stay_and_the_picture_goes():
     assert "\x1b[?25h" in file.getvalue()  # the cursor is back
 
 
-def test_a_terminal_that_takes_nothing_holds_up_nobody():
+def test_blocked_terminal_does_not_block_the_program():
     read_end, write_end = os.pipe()
     file = os.fdopen(write_end, "w")
     console = Console(file=file, force_terminal=True, width=200)
@@ -50,7 +50,7 @@ def test_a_terminal_that_takes_nothing_holds_up_nobody():
     os.close(read_end)  # the drawing thread ends with a broken pipe
 
 
-def test_who_takes_pictures(monkeypatch):
+def test_only_capable_terminals_get_a_live_display(monkeypatch):
     assert takes_pictures(Console(force_terminal=True, file=io.StringIO(), _environ={"TERM": "xterm"}))
     assert not takes_pictures(Console(file=io.StringIO()))
     monkeypatch.setenv("TERM", "dumb")

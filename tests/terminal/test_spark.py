@@ -1,4 +1,4 @@
-"""Peaks keep what is large, wherever it falls; sparklines show it."""
+"""Peak history keeps every maximum; sparklines show the peaks."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from rtctl.terminal.spark import STRETCH, WINDOW, Peaks, sparkline
 
 
-def test_one_bad_tick_of_ten_thousand_is_seen():
+def test_peak_of_one_tick_in_ten_thousand_is_kept():
     peaks = Peaks()
     t = np.arange(0, 20, 1e-3)
     values = np.where(t == t[12_345], -7.0, 0.1)
@@ -21,7 +21,7 @@ def test_one_bad_tick_of_ten_thousand_is_seen():
     assert sparkline(bars, peaks.peak)[44] == "█"
 
 
-def test_what_is_older_than_the_window_is_forgotten():
+def test_peaks_older_than_the_window_are_dropped():
     peaks = Peaks()
     peaks.feed(np.array([1.0]), np.array([9.0]))
     peaks.feed(np.array([1.0 + WINDOW]), np.array([2.0]))
@@ -31,14 +31,14 @@ def test_what_is_older_than_the_window_is_forgotten():
     assert np.isfinite(peaks.bars(30)).sum() == 1
 
 
-def test_a_clock_that_starts_again_starts_the_window_again():
+def test_restarted_clock_restarts_the_window():
     peaks = Peaks()
     peaks.feed(np.arange(0, 10, 0.1), np.full(100, 5.0))
     peaks.feed(np.array([0.05]), np.array([1.0]))
     assert peaks.peak == 1.0
 
 
-def test_what_is_no_number_is_passed_over():
+def test_nan_is_ignored():
     peaks = Peaks()
     peaks.feed(np.array([0.0, 0.01]), np.array([np.nan, np.inf]))
     assert np.isnan(peaks.peak)
@@ -47,7 +47,7 @@ def test_what_is_no_number_is_passed_over():
 
 @settings(deadline=None, max_examples=30)
 @given(st.lists(st.floats(0, 100), min_size=1, max_size=200), st.integers(1, 400))
-def test_the_highest_bar_is_the_peak_at_every_width(times, count):
+def test_highest_bar_is_the_peak_at_every_width(times, count):
     t = np.sort(np.array(times))
     values = np.cos(t)
     peaks = Peaks()
@@ -59,7 +59,7 @@ def test_the_highest_bar_is_the_peak_at_every_width(times, count):
 
 
 @pytest.mark.parametrize(("ascii_only", "full"), [(False, "█"), (True, "@")])
-def test_bars(ascii_only, full):
+def test_sparkline_characters(ascii_only, full):
     shown = sparkline(np.array([np.nan, 0.0, 0.5, 1.0]), 1.0, ascii_only)
     assert shown[0] == " " and shown[3] == full
     assert len(set(shown)) == 4

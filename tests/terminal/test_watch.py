@@ -1,4 +1,4 @@
-"""A machine that is watched: it moves, it ends, it comes back, and Ctrl-C ends the watching."""
+"""`rtctl status --watch`: a moving machine, a lost and returning daemon, and Ctrl-C."""
 
 import io
 
@@ -19,7 +19,7 @@ def machine(served, config):
 
 @pytest.fixture
 def script(monkeypatch):
-    """`script(step, ...)`: each pause of the watch does the next step, and the last is Ctrl-C."""
+    """`script(step, ...)`: each pause of the watch runs the next step; the last pause is Ctrl-C."""
 
     def make(*steps):
         left = iter(steps)
@@ -37,7 +37,7 @@ def script(monkeypatch):
 
 @pytest.fixture
 def watched(machine):
-    """`watched(console)` watches until the script ends; returns what was written."""
+    """`watched(console)` watches until the script ends; returns the output."""
 
     def run(**options):
         file = io.StringIO()
@@ -48,17 +48,17 @@ def watched(machine):
     return run
 
 
-def test_a_daemon_that_goes_and_comes_back_is_told_in_lines(machine, script, watched):
+def test_lost_and_returning_daemon_are_reported_in_lines(machine, script, watched):
     script(lambda: machine.run(0.1), machine.stop, lambda: None, lambda: None, machine.start, lambda: machine.run(0.1))
     lines = watched().splitlines()
     assert all(line.isprintable() for line in lines)
     gone = [n for n, line in enumerate(lines) if "has ended; waiting" in line]
     back = [n for n, line in enumerate(lines) if "is back (pid" in line]
-    assert len(gone) == len(back) == 1  # told once
+    assert len(gone) == len(back) == 1  # reported once
     assert gone[0] == 2 and back[0] > gone[0]  # between them there may be a daemon that does not answer yet
 
 
-def test_and_in_the_panel(machine, script, watched):
+def test_lost_and_returning_daemon_are_shown_in_the_panel(machine, script, watched):
     script(machine.stop, lambda: None, machine.start, lambda: machine.run(0.1))
     shown = watched(force_terminal=True, color_system=None, _environ={"TERM": "xterm"})
     assert "has ended; waiting for it to come back" in shown
@@ -66,7 +66,7 @@ def test_and_in_the_panel(machine, script, watched):
     assert shown.endswith("\x1b[?25h")  # the cursor is back
 
 
-def test_a_limit_that_is_changed_shows(machine, script, watched):
+def test_changed_limit_is_shown(machine, script, watched):
     def change():
         with Client(machine.endpoint) as client:
             client.call("set", path="law.limit.high", value=7.5)
@@ -77,7 +77,7 @@ def test_a_limit_that_is_changed_shows(machine, script, watched):
     assert "±10" in shown and "±7.5" in shown
 
 
-def test_a_ring_that_is_out_of_sight(machine, script, watched, monkeypatch):
+def test_watch_without_access_to_the_ring_samples_the_status(machine, script, watched, monkeypatch):
     monkeypatch.setattr("rtctl.terminal.traces.Tap", lambda ring: (_ for _ in ()).throw(PermissionError()))
     script(lambda: machine.run(0.1))
     assert ", sampled" in watched(force_terminal=True, color_system=None, _environ={"TERM": "xterm"})

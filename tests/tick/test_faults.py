@@ -1,4 +1,4 @@
-"""Faults between loop and machine, on frames, and that a run has them alike in every mode of virtual time."""
+"""Faults on the frames between loop and machine; equal in every mode of virtual time."""
 
 from collections.abc import Callable
 from itertools import pairwise
@@ -22,7 +22,7 @@ TICKS = 60
 
 
 class Line:
-    """Frames that go through the faults tick by tick: the board counts `speed` a tick and has its tick as number."""
+    """Frames through the faults, tick by tick. The board counts `speed` per tick and numbers frames by its tick."""
 
     def __init__(self, *wanted: faults.Fault, speed: int = 3, begin: int = 0, seed: int = 1):
         self.c, self.f = np.zeros(1, mailbox.COMMAND), np.zeros(1, faults.FAULTS_STATE)
@@ -33,7 +33,7 @@ class Line:
         self.board, self.speed, self.k = generate.new_frames()["rx"], speed, begin
 
     def tick(self, came: int = 1, codes: int = 0) -> tuple[int, int, list[int]]:
-        """Frames the tick is told of, the number of the frame that it sees, and codes at the machine after it."""
+        """Number of received frames, sequence number of the seen frame, and output codes at the machine."""
         self.board[0]["seq"] = self.k + 1
         counts = daq_stc.INITIAL_COUNT + self.speed * self.k
         self.board[0]["counter_codes"] = counts & (daq_stc.SIZE - 1)
@@ -57,14 +57,14 @@ def fault(name: str, begin: int, end: int, size: float | None = None, channel: i
 # the link
 
 
-def test_without_a_fault_everything_passes() -> None:
+def test_frames_pass_unchanged_without_a_fault() -> None:
     line = Line(fault("link.silent", 1000, 2000))
     assert [line.tick(codes=k) for k in range(20)] == [(1, k + 1, [k] * 4) for k in range(20)]
 
 
 @given(late=st.integers(1, 20), begin=st.integers(0, 10))
 @settings(deadline=None)
-def test_a_delay_begins_with_silence_and_then_gives_every_frame_in_order(late: int, begin: int) -> None:
+def test_link_delay_starts_with_silence_then_delivers_every_frame_in_order(late: int, begin: int) -> None:
     line = Line(fault("link.delay", begin, 50, late))
     seen = [line.tick(codes=k + 1) for k in range(TICKS)]
     for k, (fresh, number, codes) in enumerate(seen):
@@ -76,7 +76,7 @@ def test_a_delay_begins_with_silence_and_then_gives_every_frame_in_order(late: i
             assert (fresh, number, codes[0]) == (1, k - late + 1, k - late + 1)
 
 
-def test_silence_keeps_the_last_frame_both_ways() -> None:
+def test_link_silence_keeps_the_last_frame_in_both_directions() -> None:
     line = Line(fault("link.silent", 5, 9))
     seen = [line.tick(codes=k) for k in range(12)]
     assert seen[4] == (1, 5, [4] * 4)
@@ -86,7 +86,7 @@ def test_silence_keeps_the_last_frame_both_ways() -> None:
 
 @given(share=st.floats(0.0, 1.0), seed=st.integers(0, 1000))
 @settings(deadline=None)
-def test_what_is_lost_is_lost_whole_and_repeats_with_the_seed(share: float, seed: int) -> None:
+def test_link_loss_drops_whole_frames_and_repeats_with_its_seed(share: float, seed: int) -> None:
     lines = [Line(fault("link.loss", 0, TICKS, share), seed=seed) for _ in range(2)]
     seen = [[line.tick(codes=k) for k in range(TICKS)] for line in lines]
     assert seen[0] == seen[1]
@@ -96,7 +96,7 @@ def test_what_is_lost_is_lost_whole_and_repeats_with_the_seed(share: float, seed
     assert share < 1.0 or not any(fresh for fresh, _, _ in seen[0])
 
 
-def test_an_overtaken_frame_comes_with_the_next_and_the_newest_wins() -> None:
+def test_reordered_frame_arrives_with_the_next_and_the_newest_is_used() -> None:
     line = Line(fault("link.reorder", 0, TICKS, 0.5))
     seen = [line.tick() for _ in range(TICKS)]
     numbers = [number for _, number, _ in seen]
@@ -105,7 +105,7 @@ def test_an_overtaken_frame_comes_with_the_next_and_the_newest_wins() -> None:
     assert sum(fresh for fresh, _, _ in seen) in (TICKS, TICKS - 1)
 
 
-def test_a_fault_that_comes_in_a_tick_without_a_frame_sees_the_last_one() -> None:
+def test_fault_that_starts_in_a_tick_without_a_frame_uses_the_last_frame() -> None:
     line = Line()
     line.rx[0] = line.board[0]
     line.rx[0]["seq"], line.rx[0]["counter_codes"] = 7, daq_stc.INITIAL_COUNT + 100
@@ -119,7 +119,7 @@ def test_a_fault_that_comes_in_a_tick_without_a_frame_sees_the_last_one() -> Non
 
 @given(speed=st.integers(-2000, 2000), length=st.integers(1, 40))
 @settings(deadline=None)
-def test_a_frozen_counter_stands_and_what_it_did_not_count_is_lost(speed: int, length: int) -> None:
+def test_frozen_counter_holds_and_its_missed_counts_are_lost(speed: int, length: int) -> None:
     line, before = Line(fault("encoder.freeze", 10, 10 + length), speed=speed), 0
     for k in range(TICKS):
         line.tick()
@@ -130,7 +130,7 @@ def test_a_frozen_counter_stands_and_what_it_did_not_count_is_lost(speed: int, l
         before = line.counts()
 
 
-def test_missed_counts_are_not_found_again_even_when_the_faults_are_cleared() -> None:
+def test_missed_counts_stay_lost_after_the_faults_are_cleared() -> None:
     line = Line(fault("encoder.missed", 0, 10, 0.5), speed=100)
     for _ in range(20):
         line.tick()
@@ -149,7 +149,7 @@ def test_counters_wrap_under_a_fault() -> None:
         assert daq_stc.counter_position(position, int(line.rx[0]["counter_codes"][0])) == k * 3 * (1 << 18)
 
 
-def test_noise_stays_within_its_size_and_leaves_no_trace() -> None:
+def test_encoder_noise_stays_within_its_size_and_leaves_no_offset() -> None:
     line = Line(fault("encoder.noise", 10, 50, 40.0))
     jumps = []
     for k in range(TICKS):
@@ -159,7 +159,7 @@ def test_noise_stays_within_its_size_and_leaves_no_trace() -> None:
     assert max(map(abs, jumps)) <= 40 and len(set(jumps[10:50])) > 20
 
 
-def test_an_open_input_reads_its_rail_and_the_other_does_not() -> None:
+def test_open_input_reads_its_rail_and_the_other_input_does_not() -> None:
     line = Line(fault("adc.open", 0, 5, channel=1))
     line.board[0]["ai_codes"] = 100
     line.tick()
@@ -167,7 +167,7 @@ def test_an_open_input_reads_its_rail_and_the_other_does_not() -> None:
 
 
 @pytest.mark.parametrize(("polarity", "bits", "rail"), [("bipolar", 12, 2047), ("unipolar", 16, 32767)])
-def test_the_rail_is_that_of_the_inputs_own_converter(polarity: str, bits: int, rail: int) -> None:
+def test_rail_of_an_open_input_is_that_of_its_converter(polarity: str, bits: int, rail: int) -> None:
     wire = AnalogInputSettings.model_validate({"channel": 0, "polarity": polarity, "bits": bits})
     blocks = [Block("input1", build_input(wire, 0.01), None)]
     made = faults.build(faults.FaultSettings(fault="adc.open"), 0.01, 0, blocks)
@@ -181,14 +181,14 @@ def test_the_rail_is_that_of_the_inputs_own_converter(polarity: str, bits: int, 
 
 @given(codes=st.integers(-2048, 2047), bit=st.integers(0, 11))
 @settings(deadline=None)
-def test_a_stuck_bit_is_always_one(codes: int, bit: int) -> None:
+def test_stuck_output_bit_is_always_one(codes: int, bit: int) -> None:
     line = Line(fault("dac.stuck", 0, 5, bit))
     wire, *others = line.tick(codes=codes)[2]
     assert (wire + 2048) >> bit & 1 and -2048 <= wire <= 2047 and others == [codes] * 3
     assert wire - codes in (0, 1 << bit)
 
 
-def test_a_hot_driver_gives_nothing_and_a_supply_that_sags_a_share() -> None:
+def test_hot_driver_gives_zero_and_a_supply_sag_gives_a_fraction() -> None:
     assert Line(fault("driver.hot", 0, 5, channel=1)).tick(codes=700)[2] == [700, 0, 700, 700]
     sag = Line(fault("supply.sag", 0, 5, 0.1))
     assert [sag.tick(codes=c)[2][0] for c in (-2000, -100, 2000)] == [-204, -100, 204]
@@ -198,7 +198,7 @@ def board(*codes: tuple[int, int]) -> list[Block]:
     return [Block(f"output{n}", AnalogOutputParams(1.0, *both, n, 0.0, 0.0), None) for n, both in enumerate(codes)]
 
 
-def test_a_fault_of_an_output_knows_the_codes_of_each() -> None:
+def test_output_fault_uses_the_code_range_of_each_output() -> None:
     blocks = board((-32768, 32767), (0, 4095))
     made = faults.build(faults.FaultSettings(fault="supply.sag", size=0.5), 0.001, 0, blocks)
     assert Line(made).tick(codes=30000)[2] == [16384, 2048, 1024, 1024]
@@ -209,14 +209,14 @@ def test_a_fault_of_an_output_knows_the_codes_of_each() -> None:
         assert faults.in_force(line.c[0]) == [made]
 
 
-def test_a_bit_that_the_output_lacks_is_refused_and_the_usual_one_is_one_that_it_has() -> None:
+def test_stuck_bit_beyond_the_output_is_refused_and_the_default_bit_exists() -> None:
     blocks = board((-128, 127))
     assert faults.build(faults.FaultSettings(fault="dac.stuck"), 0.001, 0, blocks).size == 7.0
     with pytest.raises(ValueError, match="output 0 has no bit 8; it has 0 to 7"):
         faults.build(faults.FaultSettings(fault="dac.stuck", size=8), 0.001, 0, blocks)
 
 
-def test_lateness_is_the_largest_of_the_stalls_in_force() -> None:
+def test_lateness_is_the_largest_of_the_active_stalls() -> None:
     line = Line(fault("loop.stall", 5, 9, 1e-3), fault("loop.stall", 7, 8, 4e-3))
     assert [faults.lateness(line.c[0], k) for k in range(4, 10)] == [0, 10**6, 10**6, 4 * 10**6, 10**6, 0]
 
@@ -224,7 +224,7 @@ def test_lateness_is_the_largest_of_the_stalls_in_force() -> None:
 # settings
 
 
-def test_times_become_ticks_and_faults_of_processes_take_no_slot() -> None:
+def test_fault_times_become_ticks_and_process_faults_take_no_slot() -> None:
     made = faults.FaultSettings(fault="link.delay", at=1.0, lasts=0.0001, size=0.02)
     assert faults.build(made, 0.002, 10) == faults.Fault(faults.LINK_DELAY, 0, 510, 511, 10.0)
     command = np.zeros(1, mailbox.COMMAND)[0]
@@ -243,12 +243,12 @@ def test_times_become_ticks_and_faults_of_processes_take_no_slot() -> None:
         ({"fault": "nothing"}, "encoder.freeze"),
     ],
 )
-def test_what_makes_no_sense_is_refused_in_words(wanted: dict[str, Any], words: str) -> None:
+def test_invalid_fault_is_refused(wanted: dict[str, Any], words: str) -> None:
     with pytest.raises(ValidationError, match=words):
         faults.FaultSettings.model_validate(wanted)
 
 
-def test_a_delay_longer_than_the_line_is_refused() -> None:
+def test_delay_longer_than_the_delay_line_is_refused() -> None:
     with pytest.raises(ValueError, match="1023 is the most"):
         faults.build(faults.FaultSettings(fault="link.delay", size=1.0), 1e-4)
 
@@ -275,18 +275,18 @@ ALL = [
 ]
 
 
-def test_all_faults_of_a_run_are_to_the_bit_the_same_in_fused_and_lockstep(clean: np.ndarray) -> None:
+def test_run_with_all_faults_is_bit_exact_in_fused_and_lockstep(clean: np.ndarray) -> None:
     fused, lockstep = rows("fused", ALL), rows("lockstep", ALL)
     assert all(np.array_equal(fused[n], lockstep[n], equal_nan=True) for n in fused.dtype.names)
     assert any(not np.array_equal(fused[n], clean[n], equal_nan=True) for n in fused.dtype.names)
 
 
 @pytest.mark.parametrize("wanted", [[{"fault": "link.silent", "at": 1e6}], [{"fault": "cpu.hog", "at": 0.1}]])
-def test_faults_that_never_come_change_no_bit(clean: np.ndarray, wanted: list[dict[str, Any]]) -> None:
+def test_faults_that_never_start_do_not_change_the_run(clean: np.ndarray, wanted: list[dict[str, Any]]) -> None:
     with_fault = rows("fused", wanted)
     assert all(np.array_equal(with_fault[n], clean[n], equal_nan=True) for n in clean.dtype.names)
 
 
-def test_frames_have_as_many_channels_as_the_catalogue_says(config: Callable[..., Any]) -> None:
+def test_frames_have_the_number_of_channels_of_the_catalogue(config: Callable[..., Any]) -> None:
     assert faults.KINDS["encoder.freeze"].channels == frames.COUNTERS
     assert set(faults.PROCESSES) == {n for n, kind in faults.KINDS.items() if kind.number == 0}

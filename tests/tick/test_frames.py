@@ -6,7 +6,7 @@ from rtctl.tick import frames
 
 
 @pytest.mark.parametrize("dtype", [frames.OUTPUTS, frames.INPUTS])
-def test_records_have_no_holes_and_are_little_endian(dtype: np.dtype) -> None:
+def test_frame_records_have_no_padding_and_are_little_endian(dtype: np.dtype) -> None:
     fields = [dtype[name] for name in dtype.names or ()]
     assert fields and dtype.itemsize == sum(field.itemsize for field in fields)
     assert all(field.base.str[0] == "<" for field in fields)
@@ -24,7 +24,7 @@ def test_records_have_no_holes_and_are_little_endian(dtype: np.dtype) -> None:
         ("version", 0, False),
     ],
 )
-def test_only_our_own_frames_are_valid(name: str, field: str, value: int, valid: bool) -> None:
+def test_only_frames_of_this_protocol_are_valid(name: str, field: str, value: int, valid: bool) -> None:
     frame = generate.new_frames()[name]
     frame[field] = value
     assert frames.valid(frame[0]) == valid

@@ -1,4 +1,4 @@
-"""Every cause of a trip, at its very tick. Limits in ticks of 1 ms."""
+"""Exact tick of every cause of a trip. Limits in ticks of 1 ms."""
 
 from collections.abc import Callable
 from typing import Any
@@ -42,7 +42,7 @@ GOOD: dict[str, Any] = {
 
 
 class Machine:
-    """The safety machine with its calls in the order of a tick."""
+    """The safety state machine, with its calls in the order of a tick."""
 
     def __init__(self, p: Any = P, state: int = RUNNING):
         self.p, self.s, self.c = p, np.zeros(1, safety.SAFETY_STATE)[0], np.zeros(1, COMMAND)[0]
@@ -52,7 +52,7 @@ class Machine:
             self.s["state"] = state
 
     def tick(self, arm: int = 0, disarm: int = 0, reset: int = 0, u: float = 3.0, **signals: Any) -> float:
-        """One tick; returns the voltage that is written."""
+        """Run one tick; returns the written voltage."""
         x = {**GOOD, **signals}
         self.c["arm"] += arm
         self.c["disarm"] += disarm
@@ -68,7 +68,7 @@ class Machine:
         return safety.gate(self.p, self.s, u, 0)
 
     def trips_after(self, **signals: Any) -> int:
-        """In which of the ticks with these signals it trips, from 1; 0 if it has not within 50."""
+        """Number of the tick with these signals at which the machine trips, from 1; 0 without a trip in 50 ticks."""
         for n in range(1, 51):
             u = self.tick(**signals)
             if self.s["state"] == TRIPPED:
@@ -102,15 +102,15 @@ FINE = [{"effort": 0.9, "moves": False}, {"error": 0.5}, {"T1": 8.0, "T2": 0.0},
 
 @pytest.mark.parametrize("state", [ARMED, RUNNING])
 @pytest.mark.parametrize(("cause", "signals", "ticks"), CAUSES)
-def test_trips_at_its_tick(cause: int, signals: dict, ticks: int, state: int) -> None:
+def test_each_cause_trips_at_its_tick(cause: int, signals: dict, ticks: int, state: int) -> None:
     machine = Machine(state=state)
-    expected = 0 if cause == TENSION and state == ARMED else ticks  # tape is tightened while armed
+    expected = 0 if cause == TENSION and state == ARMED else ticks  # the tape is tightened in state armed
     assert machine.trips_after(**signals) == expected
     assert machine.s["trip"] == (cause if expected else NONE)
 
 
 @pytest.mark.parametrize(("cause", "signals", "ticks"), UNTIL)
-def test_one_good_tick_begins_the_count_anew(cause: int, signals: dict, ticks: int) -> None:
+def test_one_good_tick_restarts_the_count(cause: int, signals: dict, ticks: int) -> None:
     machine = Machine()
     for _ in range(3):
         for _ in range(ticks - 1):
@@ -121,12 +121,12 @@ def test_one_good_tick_begins_the_count_anew(cause: int, signals: dict, ticks: i
 
 
 @pytest.mark.parametrize("signals", FINE)
-def test_at_the_limit_is_not_beyond_it(signals: dict) -> None:
+def test_value_at_the_limit_does_not_trip(signals: dict) -> None:
     assert Machine().trips_after(**signals) == 0
 
 
 @pytest.mark.parametrize(("cause", "signals", "ticks"), CAUSES)
-def test_idle_never_trips(cause: int, signals: dict, ticks: int) -> None:
+def test_idle_state_never_trips(cause: int, signals: dict, ticks: int) -> None:
     machine = Machine(state=IDLE)
     for _ in range(50):
         assert machine.tick(**signals) == 0.0
@@ -134,7 +134,7 @@ def test_idle_never_trips(cause: int, signals: dict, ticks: int) -> None:
 
 
 @pytest.mark.parametrize(("cause", "signals", "ticks"), UNTIL)
-def test_what_was_wrong_while_idle_is_not_held_against_it(cause: int, signals: dict, ticks: int) -> None:
+def test_violations_in_idle_do_not_count_after_arming(cause: int, signals: dict, ticks: int) -> None:
     machine = Machine(state=IDLE)
     for _ in range(50):
         machine.tick(**signals)
@@ -152,14 +152,14 @@ OFF: list[tuple[dict, Callable[[], dict]]] = [
 
 
 @pytest.mark.parametrize(("off", "signals"), OFF)
-def test_zero_switches_a_limit_off(off: dict, signals: Callable[[], dict]) -> None:
+def test_limit_of_zero_is_off(off: dict, signals: Callable[[], dict]) -> None:
     p = safety.build(SETTINGS.model_copy(update=off), DT)
     assert Machine(p).trips_after(**signals()) == 0
 
 
 @pytest.mark.parametrize(("cause", "signals", "ticks"), CAUSES)
 @pytest.mark.parametrize(("later", "more", "_ticks"), CAUSES)
-def test_the_first_cause_is_latched(cause: int, signals: dict, ticks: int, later: int, more: dict, _ticks: int) -> None:
+def test_first_cause_is_latched(cause: int, signals: dict, ticks: int, later: int, more: dict, _ticks: int) -> None:
     machine = Machine()
     machine.trips_after(**signals)
     at = int(machine.s["trip_tick"])
@@ -168,7 +168,7 @@ def test_the_first_cause_is_latched(cause: int, signals: dict, ticks: int, later
     assert (machine.s["state"], machine.s["trip"], machine.s["trip_tick"]) == (TRIPPED, cause, at)
 
 
-def test_only_reset_leads_out_of_a_trip() -> None:
+def test_only_reset_leaves_the_tripped_state() -> None:
     machine = Machine()
     machine.trips_after(error=9.0)
     for request in ({"arm": 1}, {"disarm": 1}, {"arm": 1, "disarm": 1}, {}):
@@ -176,7 +176,7 @@ def test_only_reset_leads_out_of_a_trip() -> None:
         assert machine.s["state"] == TRIPPED and machine.s["trip"] == FOLLOWING
     assert machine.tick(reset=1) == 0.0
     assert machine.s["state"] == IDLE and machine.s["trip"] == NONE
-    assert machine.tick() == 0.0  # requests made before the reset are not remembered
+    assert machine.tick() == 0.0  # requests before the reset are dropped
     assert machine.s["state"] == IDLE
 
 
@@ -189,26 +189,26 @@ def test_reset_and_arm_in_one_tick_restart() -> None:
     assert machine.s["on"] == 0 and machine.s["armed_for"] == 2
 
 
-def test_a_reset_without_a_trip_does_nothing() -> None:
+def test_reset_without_a_trip_does_nothing() -> None:
     machine = Machine()
     assert machine.tick(reset=1) == 3.0 and machine.s["state"] == RUNNING
     machine.trips_after(error=9.0)
     machine.tick()
-    assert machine.s["state"] == TRIPPED  # the old request is spent
+    assert machine.s["state"] == TRIPPED  # the old request is consumed
 
 
 @pytest.mark.parametrize("state", [ARMED, RUNNING])
-def test_disarm_takes_the_outputs_off_at_once(state: int) -> None:
+def test_disarm_switches_the_outputs_off_at_once(state: int) -> None:
     machine = Machine(state=state)
     assert machine.tick(disarm=1) == 0.0 and machine.s["state"] == IDLE and machine.s["trip"] == NONE
 
 
-def test_disarm_beats_an_earlier_arm_and_arm_while_running_changes_nothing() -> None:
+def test_disarm_overrides_an_earlier_arm_and_arm_while_running_does_nothing() -> None:
     machine = Machine()
     assert machine.tick(arm=1) == 3.0 and machine.s["state"] == RUNNING and machine.s["on"] == 0
 
 
-def test_a_trip_with_a_ramp_takes_the_outputs_down_in_its_time() -> None:
+def test_trip_with_a_ramp_fades_the_outputs_in_its_time() -> None:
     machine = Machine(safety.build(SETTINGS.model_copy(update={"ramp": 0.01}), DT))
     machine.tick(u=-4.0)
     left = [machine.tick(u=9.0, error=9.0) for _ in range(15)]
@@ -217,7 +217,7 @@ def test_a_trip_with_a_ramp_takes_the_outputs_down_in_its_time() -> None:
     assert machine.tick(u=9.0, reset=1) == 0.0
 
 
-def test_a_command_that_is_not_a_number_is_never_written() -> None:
+def test_nan_command_is_never_written() -> None:
     machine = Machine()
     assert machine.tick(u=np.nan) == 0.0
 
@@ -235,7 +235,7 @@ def test_a_command_that_is_not_a_number_is_never_written() -> None:
         max_size=40,
     )
 )  # fmt: skip
-def test_whatever_happens_outputs_are_on_only_while_armed_or_running(events: list[dict]) -> None:
+def test_outputs_are_on_only_in_states_armed_and_running(events: list[dict]) -> None:
     machine = Machine(state=IDLE)
     for event in events:
         was = int(machine.s["state"])
@@ -251,54 +251,54 @@ TIMED = [c for c in CAUSES if c[2] > 2]
 
 
 @pytest.mark.parametrize(("cause", "signals", "ticks"), TIMED)
-def test_limits_count_periods_of_the_clock_and_not_ticks(cause: int, signals: dict, ticks: int) -> None:
-    """Half of the ticks do not run: the limit is reached after as many periods, in half of the ticks."""
+def test_limits_count_clock_periods_not_ticks(cause: int, signals: dict, ticks: int) -> None:
+    """Half of the ticks are missed: the limit is reached after an equal number of periods, in half of the ticks."""
     machine = Machine()
     assert machine.trips_after(**{**signals, "passed": 2}) == (ticks + 1) // 2
     assert machine.s["trip"] == cause
 
 
 @pytest.mark.parametrize(("cause", "signals", "ticks"), TIMED)
-def test_one_stall_as_long_as_the_limit_trips_in_its_tick(cause: int, signals: dict, ticks: int) -> None:
+def test_stall_as_long_as_the_limit_trips_in_its_tick(cause: int, signals: dict, ticks: int) -> None:
     assert Machine().trips_after(**{**signals, "passed": 1000}) == 1
 
 
-def test_a_stall_below_the_limit_is_no_trip_and_one_while_off_is_not_held_against_it() -> None:
+def test_stall_below_the_limit_or_while_off_does_not_trip() -> None:
     machine = Machine()
     assert machine.tick(late=1, passed=6) == 3.0
     machine = Machine(state=IDLE)
     assert machine.tick(arm=1, late=1, passed=1000) == 3.0 and machine.s["armed_for"] == 1
 
 
-def test_a_ramp_counts_periods_too() -> None:
+def test_trip_ramp_counts_clock_periods() -> None:
     machine = Machine(safety.build(SETTINGS.model_copy(update={"ramp": 0.01}), DT))
     machine.tick(u=4.0)
     assert machine.tick(error=9.0) == pytest.approx(3.6)
     assert machine.tick(passed=4) == pytest.approx(2.0)
 
 
-def test_what_the_board_did_before_the_arming_is_not_held_against_it() -> None:
+def test_board_watchdog_events_before_arming_do_not_trip() -> None:
     s, rx, tx = np.zeros(1, safety.SAFETY_STATE)[0], np.zeros(1, frames.INPUTS)[0], np.zeros(1, frames.OUTPUTS)[0]
     s["state"], tx["seq"] = safety.TRIPPED, 70
     assert safety.board_watchdog(s, rx, tx) == 0
     s["state"], tx["seq"] = safety.ARMED, 71
-    rx["watchdog"], rx["watchdog_seq"] = 1, 68  # the word of it comes late, out of a cable that was cut
+    rx["watchdog"], rx["watchdog_seq"] = 1, 68  # the report arrives late, after an interrupted link
     assert safety.board_watchdog(s, rx, tx) == 0
     rx["watchdog"], rx["watchdog_seq"] = 2, 71
     assert [safety.board_watchdog(s, rx, tx) for _ in range(2)] == [1, 1]
 
 
-def test_the_boards_watchdog_trips_each_time_that_its_count_moves_while_on() -> None:
+def test_board_watchdog_trips_at_each_count_while_on() -> None:
     machine = Machine(state=IDLE)
     machine.tick(watchdog=3)
     machine.tick(watchdog=3, arm=1)
     assert machine.tick(watchdog=3) == 3.0
     assert machine.tick(watchdog=4) == 0.0 and machine.s["trip"] == WATCHDOG
     machine.tick(watchdog=5, reset=1, arm=1)
-    assert machine.s["state"] == TRIPPED  # it acted in the very tick of arming
+    assert machine.s["state"] == TRIPPED  # the watchdog acted in the tick of arming
 
 
-def test_silence_of_commander_and_supervisor_is_told_apart() -> None:
+def test_silence_of_commander_and_of_supervisor_are_separate_causes() -> None:
     p = safety.build(SafetySettings(require_commander=True, commander_timeout=1.0, supervisor_timeout=2.0), DT)
     at = 10**12
     assert safety.gone(p, at, at - 10**9, at - 2 * 10**9) == NONE
@@ -309,18 +309,18 @@ def test_silence_of_commander_and_supervisor_is_told_apart() -> None:
     assert safety.gone(free, at, 1, 1) == NONE
 
 
-def test_every_cause_has_a_code_and_a_sentence() -> None:
+def test_every_trip_cause_has_a_code_and_a_sentence() -> None:
     assert sorted(safety.TRIPS) == list(range(len(safety.TRIPS)))
     codes = [code for code, _ in safety.TRIPS.values()]
     assert len(set(codes)) == len(codes) and all(why for _, why in safety.TRIPS.values())
 
 
-def test_an_empty_range_of_tension_is_refused() -> None:
+def test_empty_tension_range_is_refused() -> None:
     with pytest.raises(ValueError, match="tension_min 5 N is not below tension_max 5 N"):
         safety.build(SafetySettings(tension_min=5.0, tension_max=5.0), DT)
 
 
-def test_a_trip_in_the_tick_of_arming_has_nothing_of_the_last_session_to_fade():
+def test_trip_in_the_tick_of_arming_does_not_fade_old_outputs():
     machine = Machine(P._replace(fade=0.1))
     assert machine.tick(u=9.0) == 9.0
     machine.tick(lost=1, u=9.0)

@@ -10,7 +10,7 @@ sys.path.insert(0, str(Path(__file__).parent))  # for trace_rows.py, under impor
 
 @pytest.fixture
 def small_disk():
-    """`with small_disk(n):` no file can grow beyond n bytes: writes fail half-way, as on a full disk."""
+    """`with small_disk(n):` no file can grow beyond n bytes; writes fail half-way as on a full disk."""
 
     @contextmanager
     def limit(size: int):

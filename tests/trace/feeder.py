@@ -1,4 +1,4 @@
-"""What a child process does that records until it is killed. Imported by that process, so little is imported here."""
+"""Body of a child process that records until it is killed. Few imports: the child process imports this module."""
 
 import os
 from pathlib import Path
@@ -12,9 +12,9 @@ FINISHING = -1
 
 
 def feed(announce, folder: Path, total: int, size: int, rotation: Rotation | None) -> None:
-    """Give `total` rows to a recorder, `size` at a time, each batch when the one before is written; then finish.
+    """Put `total` rows into a recorder in batches of `size`, each after the previous batch is written; then finish.
 
-    Sends how many rows it will have given, before it gives them.
+    Sends the number of rows after each batch before the batch is put.
     """
     recorder = Recorder(folder, COLUMNS, ROW, CASE, rotation=rotation)
     for first in range(0, total, size):

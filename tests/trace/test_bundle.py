@@ -26,7 +26,7 @@ def folder(tmp_path):
     return tmp_path
 
 
-def test_a_bundle_comes_back_with_units(folder):
+def test_bundle_is_read_back_with_units(folder):
     found = load_bundle(str(folder))
     assert is_truth(found.columns, range(2500))
     assert found.columns["state"].dtype == np.int32
@@ -34,7 +34,7 @@ def test_a_bundle_comes_back_with_units(folder):
     assert found.units["u1"] == "V"
 
 
-def test_the_parquet_is_zstd_in_row_groups_with_units(tmp_path, monkeypatch):
+def test_parquet_is_zstd_in_row_groups_with_units(tmp_path, monkeypatch):
     monkeypatch.setattr(bundle, "ROW_GROUP", 4000)
     assert write_parquet(tmp_path, batches(10_500), SCHEMA) == 10_500
     file = pq.ParquetFile(tmp_path / "recording.parquet")
@@ -43,7 +43,7 @@ def test_the_parquet_is_zstd_in_row_groups_with_units(tmp_path, monkeypatch):
     assert file.schema_arrow.field("t").metadata[b"unit"] == b"s"
 
 
-def test_memory_is_flat_in_the_length_of_the_recording(tmp_path, monkeypatch):
+def test_memory_does_not_grow_with_the_length_of_the_recording(tmp_path, monkeypatch):
     monkeypatch.setattr(bundle, "ROW_GROUP", 2000)
 
     def most(rows):
@@ -64,20 +64,20 @@ def test_memory_is_flat_in_the_length_of_the_recording(tmp_path, monkeypatch):
     assert most(200_000) < 2 * most(20_000)
 
 
-def test_a_short_parquet_never_takes_the_place(tmp_path):
+def test_shorter_parquet_never_replaces_the_old_one(tmp_path):
     with pytest.raises(OSError, match="would hold 100 rows where 101 were recorded"):
         write_parquet(tmp_path, batches(100), SCHEMA, expect=101)
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_full_disk_leaves_the_old_parquet(folder, small_disk):
+def test_full_disk_leaves_the_old_parquet(folder, small_disk):
     with small_disk(2000), pytest.raises(OSError):
         write_parquet(folder, batches(50_000), SCHEMA)
     assert is_truth(load_bundle(folder).columns, range(2500))
     assert sorted(p.name for p in folder.iterdir()) == ["case.json", "recording.parquet"]
 
 
-def test_a_case_that_cannot_be_written_leaves_the_old_one(folder, small_disk):
+def test_unwritable_case_leaves_the_old_case(folder, small_disk):
     with small_disk(10), pytest.raises(OSError):
         save_case(folder, {**CASE, "notes": "x" * 1000})
     with pytest.raises(ValueError):
@@ -88,7 +88,7 @@ def test_a_case_that_cannot_be_written_leaves_the_old_one(folder, small_disk):
     assert sorted(p.name for p in folder.iterdir()) == ["case.json", "recording.parquet"]
 
 
-def test_a_case_may_hold_numpy(tmp_path):
+def test_case_may_hold_numpy_values(tmp_path):
     save_case(tmp_path, {"a": np.float64(1.5), "b": np.arange(3), "c": np.bool_(True), "d": tmp_path})
     assert json.loads((tmp_path / "case.json").read_text()) == {
         "a": 1.5,
@@ -129,13 +129,13 @@ def table(**columns):
         (table(t=[0.0], note=["hello"]), "'note' holds string"),
     ],
 )
-def test_a_spoiled_bundle_is_told_in_words(folder, spoil, words):
+def test_damaged_bundle_gives_an_error_message(folder, spoil, words):
     spoil(folder)
     with pytest.raises(UserError, match=words):
         load_bundle(folder)
 
 
-def test_an_unfinished_recording_is_sent_to_repair(tmp_path):
+def test_unfinished_recording_error_names_repair(tmp_path):
     (tmp_path / "recording.arrows").touch()
     with pytest.raises(UserError, match="run: rtctl trace repair"):
         load_bundle(tmp_path)

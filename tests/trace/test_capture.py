@@ -13,7 +13,7 @@ RATE = 100.0
 
 
 def run(capture: Capture, ticks: np.ndarray, fires: int | None, cuts: list[int]) -> np.ndarray:
-    """Feed rows of these ticks, of which the one of tick `fires` and later have an error; returns what was written."""
+    """Feed rows of `ticks`, with an error from tick `fires` on; returns the captured rows."""
     rows = np.zeros(len(ticks), ROW)
     rows["tick"] = ticks
     rows["error"] = ticks >= (math.inf if fires is None else fires)
@@ -37,7 +37,7 @@ def on_error() -> Trigger:
     pre=st.integers(0, 120),
     length=st.integers(1, 200),
 )
-def test_gives_just_the_stretch_around_the_trigger(lost, cuts, fires, pre, length):
+def test_capture_contains_exactly_the_rows_around_the_trigger(lost, cuts, fires, pre, length):
     ticks = np.array(sorted(set(range(300)) - lost))
     later = ticks[ticks >= fires]
     capture = Capture(length / RATE, pre / RATE, on_error(), RATE)
@@ -52,19 +52,19 @@ def test_gives_just_the_stretch_around_the_trigger(lost, cuts, fires, pre, lengt
 
 
 @given(st.lists(st.integers(0, 100), max_size=5))
-def test_without_a_trigger_it_starts_at_the_first_row(cuts):
+def test_capture_without_a_trigger_starts_at_the_first_row(cuts):
     capture = Capture(0.3, 0.5, None, RATE)
     assert run(capture, np.arange(1000, 1100), None, cuts).tolist() == list(range(1000, 1030))
     assert capture.done and capture.trigger_tick == 1000
 
 
-def test_inf_records_to_the_end():
+def test_capture_of_infinite_length_records_to_the_end():
     capture = Capture(math.inf, 0.0, None, RATE)
     assert len(run(capture, np.arange(5000), None, [100, 900])) == 5000
     assert not capture.done
 
 
-def test_what_is_held_back_is_bounded():
+def test_pretrigger_buffer_is_bounded():
     capture = Capture(1.0, 0.5, on_error(), RATE)
     for first in range(0, 10_000, 20):
         rows = np.zeros(20, ROW)
@@ -73,7 +73,7 @@ def test_what_is_held_back_is_bounded():
         assert sum(map(len, capture._before)) <= 50 + 20
 
 
-def test_gives_nothing_after_the_end():
+def test_capture_returns_nothing_after_its_end():
     capture = Capture(0.1, 0.0, None, RATE)
     run(capture, np.arange(20), None, [])
     rows, done = capture.feed(np.zeros(5, ROW))
@@ -81,12 +81,12 @@ def test_gives_nothing_after_the_end():
 
 
 @pytest.mark.parametrize("times", [(0, 0, 100), (1, -1, 100), (1, math.inf, 100), (1, 0, 0), (math.nan, 0, 1)])
-def test_refuses_times_that_make_no_sense(times):
+def test_invalid_capture_times_are_refused(times):
     with pytest.raises(ValueError, match="a capture needs"):
         Capture(times[0], times[1], None, times[2])
 
 
-def test_history_precedes_the_trigger_and_never_is_it():
+def test_history_fills_the_pretrigger_but_never_triggers():
     rows = np.zeros(100, [("tick", "i8"), ("t", "f8"), ("x", "f8")])
     rows["tick"] = np.arange(100)
     rows["x"][20:30] = 1.0  # an event before the request
@@ -98,7 +98,7 @@ def test_history_precedes_the_trigger_and_never_is_it():
     assert taken["tick"].tolist() == list(range(60, 80))
 
 
-def test_history_goes_before_a_capture_without_a_trigger():
+def test_history_precedes_a_capture_without_a_trigger():
     rows = np.zeros(100, [("tick", "i8"), ("t", "f8")])
     rows["tick"] = np.arange(100)
     capture = Capture(0.2, 0.1, None, 100.0)

@@ -1,4 +1,4 @@
-"""One clock rule: what import takes diagnose takes."""
+"""Clock of a recording: import and diagnosis accept the same time columns."""
 
 import numpy as np
 import pytest
@@ -29,7 +29,7 @@ FEW_DIGITS = {
 
 @pytest.mark.parametrize("told", [True, False])
 @pytest.mark.parametrize("name", FEW_DIGITS)
-def test_few_digits_are_an_even_clock(name, told):
+def test_clock_of_few_digits_is_made_even(name, told):
     t, rate = FEW_DIGITS[name]
     clock = even_rows(t, rate if told else None, row)
     assert clock.rate == pytest.approx(rate, rel=1e-9)
@@ -38,7 +38,7 @@ def test_few_digits_are_an_even_clock(name, told):
 
 
 @pytest.mark.parametrize("name", FEW_DIGITS)
-def test_what_import_takes_diagnose_takes(tmp_path, name):
+def test_diagnosis_accepts_every_imported_clock(tmp_path, name):
     t, rate = FEW_DIGITS[name]
     u = np.sign(np.sin(K / 500.0))
     table = Table(tmp_path / "a.csv", {"t": t, "u": u, "x": np.cumsum(u) * 1e-5}, {})
@@ -48,20 +48,20 @@ def test_what_import_takes_diagnose_takes(tmp_path, name):
     assert np.diff(record.t) == pytest.approx(1 / rate, rel=1e-6)
 
 
-def test_a_row_that_is_lost_under_a_clock_of_few_digits_is_told(tmp_path):
+def test_lost_row_under_a_clock_of_few_digits_is_reported(tmp_path):
     t = np.round(np.delete(K, [1000, *range(5000, 5040)]) / 10_000, 3)
     with pytest.raises(UserError, match=r"line 1016: 0.102 s is more than the last digit .0.001 s. off an even clock"):
         even_rows(t, 10_000.0, row)
 
 
-def test_diagnosis_reads_the_same_digits_of_a_bundle_that_others_wrote(tmp_path):
+def test_diagnosis_makes_the_clock_of_a_foreign_bundle_even(tmp_path):
     t, rate = FEW_DIGITS["ticks of 1 ms at 400 Hz"]
     assert 1 / np.median(np.diff(t)) != pytest.approx(rate, rel=0.1)
     clock = even_rows(t, rate, row, "sample_rate in case.json is {:g} Hz", gaps=True)
     assert clock.rate == rate and np.diff(clock.t) == pytest.approx(1 / rate)
 
 
-def test_all_digits_stay_as_they_are():
+def test_clock_of_full_precision_is_unchanged():
     for t in (K * 1e-3, K / 1024, 0.3 + K / 3000, np.round(K / 3000, 9)):
         clock = even_rows(t, None, row)
         assert clock.t is t and clock.note == ""
@@ -91,12 +91,12 @@ JITTER = np.random.default_rng(7).uniform(-0.2e-3, 0.2e-3, len(K))
         (np.round(K / 10_000, 3), 8000.0, "a.csv: time"),
     ],
 )
-def test_where_a_clock_breaks_it_is_told_by_row(t, rate, words):
+def test_clock_error_names_the_row(t, rate, words):
     with pytest.raises(UserError, match=words):
         even_rows(t, rate, row)
 
 
-def test_jitter_and_gaps_of_a_real_loop_are_no_staircase():
+def test_jitter_and_gaps_of_a_real_loop_are_not_a_rounded_clock():
     t = K / 1000 + JITTER
     assert even_rows(t, 1000.0, row).t is t
     lost = np.delete(t, [500, 501, 900])
@@ -104,7 +104,7 @@ def test_jitter_and_gaps_of_a_real_loop_are_no_staircase():
     assert usual_step(np.diff(lost)) == pytest.approx(1e-3, rel=1e-4)
 
 
-def test_a_rate_that_is_a_little_off_is_noted():
+def test_small_rate_error_is_noted():
     assert (
         "time runs at 1000 rows a second and --rate says 1005: 1005 Hz is taken"
         in even_rows(K / 1000, 1005.0, row).note
@@ -112,7 +112,7 @@ def test_a_rate_that_is_a_little_off_is_noted():
 
 
 @pytest.mark.parametrize("unit", ["ns", "us"])
-def test_a_time_that_cannot_be_in_seconds_is_asked_about(tmp_path, unit):
+def test_time_that_cannot_be_in_seconds_needs_a_unit(tmp_path, unit):
     per_second = {"ns": 10**9, "us": 10**6}[unit]
     t = 1_700_000_000 * per_second + K * (per_second // 1000)
     table = Table(tmp_path / "a.csv", {"t": t, "u": np.sin(K), "x": np.cos(K)}, {})

@@ -13,12 +13,12 @@ def test_unit_and_help_are_in_the_metadata_of_each_field():
     assert schema(COLUMNS, ROW, {"case": "{}"}).metadata == {b"case": b"{}"}
 
 
-def test_columns_come_back_as_they_went_in():
+def test_columns_survive_a_round_trip():
     assert columns_of(schema(COLUMNS, ROW)) == list(COLUMNS)
     assert columns_of(pa.schema([("x", pa.int8())])) == [Column("x", "", "")]
 
 
-def test_a_batch_holds_the_rows_to_the_bit():
+def test_batch_holds_the_rows_bit_exact():
     rows = make(5, 9)
     assert is_truth(record_batch(rows, schema(COLUMNS, ROW)), range(5, 14))
     assert is_truth(record_batch(rows[::2], schema(COLUMNS, ROW)), range(5, 14, 2))
@@ -32,6 +32,6 @@ def test_a_batch_holds_the_rows_to_the_bit():
         ([Column("x", "m", "")], np.dtype([("x", "f8", (4,))]), "'x' is not a scalar"),
     ],
 )
-def test_refuses_columns_that_cannot_be_recorded(columns, dtype, words):
+def test_unrecordable_columns_are_refused(columns, dtype, words):
     with pytest.raises(ValueError, match=words):
         schema(columns, dtype)

@@ -15,7 +15,7 @@ N, RATE = 2000, 1000.0
 
 
 def columns(start=500, gain=1.0, first=0, n=N):
-    """A step at tick `start`, followed with a lag, recorded from tick `first` on."""
+    """Columns of a step at tick `start` and a lagged response, recorded from tick `first` on."""
     tick = np.arange(first, first + n)
     ref = np.where(tick < start, 0.0, 0.01)
     x = gain * 0.01 * -np.expm1(-np.maximum(tick - start, 0) / 50)
@@ -36,13 +36,13 @@ def by_name(found):
     return {signal.column: signal for signal in found.signals}
 
 
-def test_the_same(tmp_path):
+def test_identical_recordings_have_no_difference(tmp_path):
     found = compare(bundle(tmp_path / "a", columns()), bundle(tmp_path / "b", columns()))
     assert found.same and not found.different and (found.aligned, found.offset, len(found.rows_a)) == ("tick", 0, N)
     assert all((s.rms, s.largest, s.first_tick) == (0.0, 0.0, -1) for s in found.signals)
 
 
-def test_where_a_signal_differs_and_by_how_much(tmp_path):
+def test_difference_has_its_first_tick_and_largest_value(tmp_path):
     other = columns()
     other["u"] = other["u"].copy()
     other["u"][700] += 3.0
@@ -56,15 +56,15 @@ def test_where_a_signal_differs_and_by_how_much(tmp_path):
     assert compare(found.a, found.b, ["x", "t"]).same
 
 
-def test_one_bit_counts(tmp_path):
+def test_difference_of_one_bit_is_found(tmp_path):
     other = columns()
     other["x"] = other["x"].copy()
-    other["x"][3] = -other["x"][3]  # one of the two zeros
+    other["x"][3] = -other["x"][3]  # negative zero
     found = compare(bundle(tmp_path / "a", columns()), bundle(tmp_path / "b", other))
     assert [(s.column, s.first_tick, s.largest) for s in found.different] == [("x", 3, 0.0)]
 
 
-def test_steps_side_by_side(tmp_path):
+def test_step_metrics_of_both_recordings_are_compared(tmp_path):
     found = compare(bundle(tmp_path / "a", columns()), bundle(tmp_path / "b", columns(gain=0.9)))
     assert [len(found.steps_a), len(found.steps_b)] == [1, 1]
     assert found.steps_a[0]["final_error_mm"] == pytest.approx(0.0, abs=1e-6)
@@ -72,12 +72,12 @@ def test_steps_side_by_side(tmp_path):
     json.dumps(as_dict(found))
 
 
-def test_laid_upon_each_other_where_the_reference_starts(tmp_path):
+def test_recordings_are_aligned_at_the_start_of_the_reference(tmp_path):
     a, b = bundle(tmp_path / "a", columns()), bundle(tmp_path / "b", columns(start=800))
     found = compare(a, b)
     assert (found.aligned, found.offset, len(found.rows_a)) == ("reference", 300, N - 300)
     assert not found.different and "t" not in by_name(found)
-    assert not found.same  # they are not one and the same recording
+    assert not found.same  # aligned, but not identical
     by_tick = compare(a, b, align="tick")
     assert by_name(by_tick)["target"].first_tick == 500 and by_name(by_tick)["target"].ticks == 300
 
@@ -87,7 +87,7 @@ def test_laid_upon_each_other_where_the_reference_starts(tmp_path):
     starts=st.tuples(st.integers(1, 900), st.integers(1, 900)),
     firsts=st.tuples(st.integers(0, 300), st.integers(0, 300)),
 )
-def test_any_shift_is_found(starts, firsts):
+def test_any_time_shift_is_found(starts, firsts):
     a, b = (
         Bundle(columns(first + start, first=first), {"plant": "axis"}, "x", {})
         for start, first in zip(starts, firsts, strict=True)
@@ -97,28 +97,28 @@ def test_any_shift_is_found(starts, firsts):
     assert not [s for s in found.different if s.column not in ("tick", "t")]
 
 
-def test_a_stretch_of_a_run_lies_where_it_was_cut_out(tmp_path):
+def test_part_of_a_run_is_aligned_by_its_ticks(tmp_path):
     two = columns()
     two["target"] = two["target"] + np.where(two["tick"] < 1500, 0.0, 0.01)
-    cut = {name: values[1000:] for name, values in two.items()}  # its reference moves first at 1500
+    cut = {name: values[1000:] for name, values in two.items()}  # first change of its reference: tick 1500
     found = compare(bundle(tmp_path / "a", two), bundle(tmp_path / "b", cut))
     assert (found.aligned, found.offset, len(found.rows_a)) == ("tick", 0, 1000) and not found.different
 
 
-def test_rows_that_one_of_them_has_lost(tmp_path):
+def test_lost_rows_of_one_recording_are_skipped(tmp_path):
     kept = np.delete(np.arange(N), slice(100, 200))
     other = {name: values[kept] for name, values in columns().items()}
     found = compare(bundle(tmp_path / "a", columns()), bundle(tmp_path / "b", other))
     assert len(found.rows_a) == N - 100 and not found.different and not found.same
 
 
-def test_without_ticks_rows_are_counted(tmp_path):
+def test_recordings_without_ticks_are_aligned_by_row(tmp_path):
     bare = {name: values for name, values in columns().items() if name != "tick"}
     found = compare(bundle(tmp_path / "a", bare), bundle(tmp_path / "b", bare))
     assert found.same and len(found.rows_a) == N
 
 
-def test_columns_that_only_one_has_and_what_was_not_measured(tmp_path):
+def test_columns_of_one_recording_and_missing_values_are_reported(tmp_path):
     one = {**columns(), "w": np.full(N, np.nan), "only": np.zeros(N)}
     two = {**columns(), "w": np.full(N, np.nan), "mine": np.zeros(N)}
     found = compare(bundle(tmp_path / "a", one), bundle(tmp_path / "b", two))
@@ -136,12 +136,12 @@ def test_columns_that_only_one_has_and_what_was_not_measured(tmp_path):
         ({"tick": np.arange(N) + 10_000}, {}, {"align": "tick"}, NoAnswer, "no tick in common"),
     ],
 )
-def test_refuses_in_words(tmp_path, change, case, asked, error, words):
+def test_incomparable_recordings_are_refused(tmp_path, change, case, asked, error, words):
     a, b = bundle(tmp_path / "a", columns()), bundle(tmp_path / "b", {**columns(), **change}, **case)
     with pytest.raises(error, match=words):
         compare(a, b, **asked)
 
 
-def test_a_reference_that_never_moves_leaves_the_ticks(tmp_path):
+def test_constant_reference_aligns_by_ticks(tmp_path):
     still = {**columns(), "target": np.zeros(N)}
     assert compare(bundle(tmp_path / "a", still), bundle(tmp_path / "b", still)).aligned == "tick"

@@ -1,4 +1,4 @@
-"""Each format is read back by a reader that is not ours."""
+"""Each export format is read back by a third-party reader."""
 
 import csv
 import json
@@ -23,7 +23,7 @@ ROWS = 700
 BEGAN = "2026-11-21T10:44:28+00:00"
 BEGAN_NS = 1795257868 * 10**9
 UNITS = {"tick": "1", "t": "s", "ref": "rad", "u1": "V", "state": "1"}
-NAMES = ["t", "tick", "ref", "u1", "state"]  # the clock first
+NAMES = ["t", "tick", "ref", "u1", "state"]  # clock first
 
 
 @pytest.fixture(scope="module")
@@ -43,13 +43,13 @@ def small_batches(monkeypatch):
 
 
 def same(columns, ticks=None):
-    """Whether these are the rows of `ticks` (all), to the bit."""
+    """Whether `columns` are the rows of `ticks` (default all), bit-exact."""
     truth = make(0, ROWS)[slice(None) if ticks is None else ticks]
     found = {name: np.asarray(columns[name]) for name in ROW.names}
     return all(np.array_equal(found[name], truth[name]) for name in ROW.names)
 
 
-def test_csv(bundle, tmp_path):
+def test_export_to_csv(bundle, tmp_path):
     done = export(bundle, "csv", tmp_path / "a.csv")
     raw = done.path.read_bytes()
     assert raw.count(b"\r\n") == raw.count(b"\n") == ROWS + 1  # RFC 4180
@@ -61,7 +61,7 @@ def test_csv(bundle, tmp_path):
     assert (done.rows, done.columns, done.bytes) == (ROWS, tuple(NAMES), len(raw))
 
 
-def test_mat(bundle, tmp_path):
+def test_export_to_mat(bundle, tmp_path):
     found = loadmat(export(bundle, "mat", tmp_path / "a.mat").path, simplify_cells=True)
     assert same(found)
     assert found["t"].dtype == np.float64 and found["tick"].dtype == np.int64
@@ -69,7 +69,7 @@ def test_mat(bundle, tmp_path):
     assert json.loads(found["case_json"])["plant"] == "ivu"
 
 
-def test_mat_names_are_matlab_names(tmp_path):
+def test_mat_names_are_valid_in_matlab(tmp_path):
     columns = {
         "t": [0.0, 1.0],
         "position.d": [1.0, 2.0],
@@ -85,21 +85,21 @@ def test_mat_names_are_matlab_names(tmp_path):
     assert found["columns"]["position_d_2"] == "position_d"
 
 
-def test_parquet(bundle, tmp_path):
+def test_export_to_parquet(bundle, tmp_path):
     table = pq.read_table(export(bundle, "parquet", tmp_path / "a.parquet").path)
     assert same(table)
     assert {f.name: f.metadata[b"unit"].decode() for f in table.schema} == UNITS
     assert json.loads(table.schema.metadata[b"case"])["sample_rate"] == 500.0
 
 
-def test_parquet_in_duckdb(bundle, tmp_path):
+def test_duckdb_reads_exported_parquet(bundle, tmp_path):
     duckdb = pytest.importorskip("duckdb")
     path = export(bundle, "parquet", tmp_path / "a.parquet").path
     assert same(duckdb.sql(f"select * from '{path}'").fetchnumpy())
 
 
-def test_mcap(bundle, tmp_path):
-    """With mcap's reader and protobuf's own decoder, checksums and the summary checked."""
+def test_export_to_mcap(bundle, tmp_path):
+    """Read by mcap and decoded by protobuf; checksums and summary are checked."""
     decoder = pytest.importorskip("mcap_protobuf.decoder")
     from mcap.reader import make_reader
 
@@ -124,8 +124,8 @@ def test_mcap(bundle, tmp_path):
     assert len(summary.chunk_indexes) == counted.chunk_count > 1
 
 
-def test_mcap_of_many_columns_of_every_type(tmp_path):
-    """Tags of two and three bytes, names that protobuf does not allow, and gaps, read back by protobuf and by us."""
+def test_export_to_mcap_of_many_columns_of_every_type(tmp_path):
+    """Tags of two and three bytes, names invalid in protobuf, and gaps; read back by protobuf and by rtctl."""
     decoder = pytest.importorskip("mcap_protobuf.decoder")
     from mcap.reader import make_reader
 
@@ -151,7 +151,7 @@ def test_mcap_of_many_columns_of_every_type(tmp_path):
     assert all(np.array_equal(table.columns[k.__name__], columns[k.__name__]) for k in kinds)
 
 
-def test_mcap_json(bundle, tmp_path):
+def test_export_to_mcap_json(bundle, tmp_path):
     reader = pytest.importorskip("mcap.reader")
     with export(bundle, "mcap-json", tmp_path / "a.mcap").path.open("rb") as file:
         opened = reader.make_reader(file)
@@ -169,7 +169,7 @@ def test_mcap_json(bundle, tmp_path):
     assert attached["case.json"]["plant"] == "ivu"
 
 
-def test_mf4(bundle, tmp_path):
+def test_export_to_mf4(bundle, tmp_path):
     asammdf = pytest.importorskip("asammdf")
     with asammdf.MDF(export(bundle, "mf4", tmp_path / "a.mf4").path) as mdf:
         assert mdf.header.start_time.isoformat() == BEGAN
@@ -178,7 +178,7 @@ def test_mf4(bundle, tmp_path):
     assert {name: s.unit for name, s in signals.items()} == {n: u for n, u in UNITS.items() if n != "t"}
 
 
-def test_tdms(bundle, tmp_path):
+def test_export_to_tdms(bundle, tmp_path):
     nptdms = pytest.importorskip("nptdms")
     found = nptdms.TdmsFile.read(export(bundle, "tdms", tmp_path / "a.tdms").path)
     group = found["ivu"]
@@ -190,19 +190,19 @@ def test_tdms(bundle, tmp_path):
 
 
 @pytest.mark.parametrize("to", FORMATS)
-def test_one_row_of_three_of_a_stretch(bundle, tmp_path, to):
+def test_export_of_every_third_row_of_a_time_range(bundle, tmp_path, to):
     pytest.importorskip(FORMATS[to].package or "numpy")
     done = export(bundle, to, tmp_path / "a", Selection(("u1",), 0.1, 0.9, 3))
     assert (done.rows, done.columns) == (134, ("t", "u1"))
-    assert list(tmp_path.iterdir()) == [tmp_path / "a"]  # nothing is left lying about
+    assert list(tmp_path.iterdir()) == [tmp_path / "a"]  # no temporary files are left
 
 
-def test_a_stretch_is_the_same_whatever_the_batches(bundle, tmp_path):
+def test_exported_time_range_does_not_depend_on_the_batches(bundle, tmp_path):
     table = pq.read_table(export(bundle, "parquet", tmp_path / "a.parquet", Selection((), 0.1, 0.9, 3)).path)
     assert same(table, slice(50, 451, 3))
 
 
-def test_what_was_not_measured(tmp_path):
+def test_missing_values_are_exported_as_empty(tmp_path):
     folder = written(
         tmp_path / "b", {"t": [0.0, 1.0, 2.0], "ref": [np.nan, 1.5, np.inf], "x": None, "on": [True, False, True]}
     )
@@ -218,7 +218,7 @@ def test_what_was_not_measured(tmp_path):
 
 
 @pytest.mark.parametrize("to", ["mcap", "mcap-json"])
-def test_a_clock_that_starts_below_zero(tmp_path, to):
+def test_clock_that_starts_below_zero_is_exported(tmp_path, to):
     pytest.importorskip("mcap")
     from mcap.reader import make_reader
 
@@ -236,13 +236,13 @@ def test_a_clock_that_starts_below_zero(tmp_path, to):
         ("csv", Selection((), 5.0, 6.0), r"holds no rows from 5 s to 6 s; its column t runs from 0 s to 1.398 s"),
     ],
 )
-def test_refuses_in_words(bundle, tmp_path, to, selection, words):
+def test_invalid_format_or_selection_is_refused(bundle, tmp_path, to, selection, words):
     with pytest.raises(UserError, match=words):
         export(bundle, to, tmp_path / "a", selection)
     assert not list(tmp_path.iterdir())
 
 
-def test_refuses_what_is_no_bundle_and_what_cannot_be_written(bundle, tmp_path):
+def test_invalid_bundle_or_target_is_refused(bundle, tmp_path):
     with pytest.raises(UserError, match="not a folder"):
         export(tmp_path / "nothing", "csv")
     with pytest.raises(UserError, match="cannot be written"):
@@ -265,7 +265,7 @@ def test_refuses_what_is_no_bundle_and_what_cannot_be_written(bundle, tmp_path):
         ("rrd", "rerun", r"'rtctl\[rerun\]'"),
     ],
 )
-def test_a_missing_package_is_told_with_what_installs_it(bundle, tmp_path, monkeypatch, to, package, how):
+def test_missing_package_error_names_the_extra(bundle, tmp_path, monkeypatch, to, package, how):
     for name in [*sys.modules, package]:
         if name.partition(".")[0] == package:
             monkeypatch.setitem(sys.modules, name, None)
@@ -274,7 +274,7 @@ def test_a_missing_package_is_told_with_what_installs_it(bundle, tmp_path, monke
         export(bundle, to, tmp_path / "a")
 
 
-def test_a_failure_leaves_the_file_of_before(bundle, tmp_path, small_disk):
+def test_failed_export_leaves_the_old_file(bundle, tmp_path, small_disk):
     path = tmp_path / "a.csv"
     path.write_text("before")
     with small_disk(2000), pytest.raises(UserError, match="File too large"):

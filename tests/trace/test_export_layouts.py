@@ -1,4 +1,4 @@
-"""The PlotJuggler layouts in docs name curves that an exported file has."""
+"""PlotJuggler layouts in docs: every curve exists in an exported file."""
 
 import csv
 import json
@@ -18,7 +18,7 @@ LAYOUTS = Path(__file__).parents[2] / "docs" / "plotjuggler"
 
 @pytest.fixture(scope="module", params=["ivu", "ldu"])
 def recording(request, tmp_path_factory):
-    """(kind, bundle) with every column that the machine records."""
+    """(kind, bundle) with every column of the machine."""
     folder = tmp_path_factory.mktemp(request.param)
     columns = machines.MODULES[request.param].COLUMNS
     fields = [pa.field(c.name, pa.float64(), metadata={"unit": c.unit, "help": c.help}) for c in columns]
@@ -36,7 +36,7 @@ def curves(root):
     return [curve.get("name") for curve in root.iter("curve")]
 
 
-def test_csv(recording):
+def test_csv_layout_names_exported_columns(recording):
     kind, folder = recording
     with export(folder, "csv").path.open(newline="") as file:
         header = next(csv.reader(file))
@@ -46,7 +46,7 @@ def test_csv(recording):
     assert root.find("Plugins/plugin/default").get("time_axis") == header[0]  # before
 
 
-def test_mcap(recording):
+def test_mcap_layout_names_exported_topics(recording):
     decoder = pytest.importorskip("mcap_protobuf.decoder")
     from mcap.reader import make_reader
 
@@ -57,7 +57,7 @@ def test_mcap(recording):
     assert set(curves(layout(kind))) <= {f"{channel.topic}/{field.name}" for field in row.DESCRIPTOR.fields}
 
 
-def test_mcap_json(recording):
+def test_mcap_json_layout_names_exported_topics(recording):
     reader = pytest.importorskip("mcap.reader")
     kind, folder = recording
     with export(folder, "mcap-json").path.open("rb") as file:
@@ -99,7 +99,7 @@ VALUES = {
 
 
 @pytest.mark.parametrize("name", ["ivu", "ivu_csv", "ldu", "ldu_csv"])
-def test_the_program_knows_every_element_and_value(name):
+def test_plotjuggler_knows_every_element_and_value(name):
     for element in layout(name).iter():
         if not isinstance(element.tag, str):  # a comment
             continue
@@ -109,7 +109,7 @@ def test_the_program_knows_every_element_and_value(name):
 
 
 @pytest.mark.parametrize("name", ["ivu", "ivu_csv", "ldu", "ldu_csv"])
-def test_panes(name):
+def test_layouts_have_the_documented_panes(name):
     root = layout(name)
     titles = [area.get("name") for area in root.iter("DockArea")]
     assert {"Position and reference", "Error", "Outputs", "Speed", "State and trip", "Period and lateness"} <= set(

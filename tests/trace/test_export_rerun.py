@@ -1,4 +1,4 @@
-"""Rerun's own reader finds scalars, timelines and panels in an exported recording, and the messages of an MCAP file."""
+"""The reader of Rerun finds scalars, timelines and panels of an exported recording, and messages of an MCAP file."""
 
 import numpy as np
 import pyarrow as pa
@@ -38,7 +38,7 @@ def bundle(tmp_path, monkeypatch):
 
 
 def series(reader, entity):
-    """Rows of an entity's scalars with its timelines, sorted by `t`."""
+    """Scalars and timelines of an entity, sorted by `t`."""
     found = [c.to_record_batch() for c in reader.stream() if c.entity_path == entity and not c.is_static]
     columns = {}
     for name in ("t", "time"):
@@ -48,7 +48,7 @@ def series(reader, entity):
     return {name: values[order] for name, values in columns.items()}
 
 
-def test_every_signal_is_a_series_of_scalars_on_both_clocks(bundle):
+def test_every_signal_is_a_scalar_series_on_both_timelines(bundle):
     folder, values = bundle
     reader = chunk.RrdReader(export(folder, "rrd").path)
     entities = {c.entity_path for c in reader.stream()}
@@ -60,7 +60,7 @@ def test_every_signal_is_a_series_of_scalars_on_both_clocks(bundle):
         assert np.array_equal(found["time"], BEGAN_NS + found["t"])
 
 
-def test_names_have_units_and_a_panel_holds_the_signals_of_one_unit(bundle):
+def test_names_have_units_and_each_panel_has_one_unit(bundle):
     reader = chunk.RrdReader(export(bundle[0], "rrd").path)
     titles = {
         c.entity_path: c.to_record_batch().column("SeriesLines:names").to_pylist()[0][0]
@@ -76,20 +76,20 @@ def test_names_have_units_and_a_panel_holds_the_signals_of_one_unit(bundle):
     assert sorted(queries) == [["+ /ivu/capstan.d", "+ /ivu/ref"], ["+ /ivu/on", "+ /ivu/tick"], ["+ /ivu/u1"]]
 
 
-def test_a_selection(bundle):
+def test_selected_columns_and_rows_are_exported(bundle):
     folder, values = bundle
     found = series(chunk.RrdReader(export(folder, "rrd", None, Selection(("u1",), 0.1, 0.5, 3)).path), "/ivu/u1")
     assert found["scalar"].tolist() == values["u1"][50:251:3].tolist()
 
 
-def test_rerun_that_is_switched_off_is_told(bundle, monkeypatch):
+def test_disabled_rerun_is_an_error(bundle, monkeypatch):
     monkeypatch.setenv("RERUN", "off")
     with pytest.raises(UserError, match="take RERUN=off out of the environment"):
         export(bundle[0], "rrd")
     assert not (bundle[0] / "trace.rrd").exists()
 
 
-def test_an_mcap_file_is_decoded(bundle):
+def test_rerun_decodes_an_exported_mcap_file(bundle):
     folder, values = bundle
     found = [c.to_record_batch() for c in chunk.McapReader(export(folder, "mcap").path).stream()
              if c.entity_path == "/ivu" and not c.is_static]  # fmt: skip

@@ -39,7 +39,7 @@ def text(path, header="time,vir,qm", rows=None, end="\n"):
 
 
 def foreign(path):
-    """The same recording in each of the formats, by the names of another laboratory."""
+    """One recording in each format, with column names of another laboratory."""
     columns = {"time": T, "vir": U, "qm": X}
     if path.suffix == ".csv":
         return text(path)
@@ -64,7 +64,7 @@ def foreign(path):
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".npz", ".parquet", ".mat", ".mcap"])
-def test_each_format_to_the_bit(tmp_path, suffix):
+def test_import_of_each_format_is_bit_exact(tmp_path, suffix):
     if suffix == ".mcap":
         pytest.importorskip("mcap")
     made = make_bundle(read(foreign(tmp_path / f"a{suffix}")), plan(), tmp_path / "b")
@@ -78,7 +78,7 @@ def test_each_format_to_the_bit(tmp_path, suffix):
 
 @pytest.mark.skipif(not EMPS.is_dir(), reason="the recording of a real axis is not here")
 @pytest.mark.parametrize("to", ["csv", "mat", "parquet", "mcap"])
-def test_a_real_axis_there_and_back(tmp_path, to):
+def test_real_axis_survives_export_and_import(tmp_path, to):
     if to == "mcap":
         pytest.importorskip("mcap")
     path = export(EMPS, to, tmp_path / f"emps.{to}").path
@@ -90,7 +90,7 @@ def test_a_real_axis_there_and_back(tmp_path, to):
 
 
 @pytest.mark.parametrize("plant", ["axis", "ivu", "ldu"])
-def test_what_each_machine_records_there_and_back(tmp_path, plant):
+def test_columns_of_each_machine_survive_export_and_import(tmp_path, plant):
     known = known_columns(plant)
     values = {name: np.round(np.sin(np.arange(20.0) + k) * 100) for k, name in enumerate(known)}
     values["t"] = np.arange(20) * 0.01
@@ -107,7 +107,7 @@ def test_what_each_machine_records_there_and_back(tmp_path, plant):
     assert load_bundle(tmp_path / "b").units == {name: c.unit for name, c in known.items() if c.unit}
 
 
-def test_units_of_the_file_and_of_the_owner(tmp_path):
+def test_units_of_the_file_and_of_the_user_are_converted(tmp_path):
     table = read(text(tmp_path / "a.csv", "time [ms],vir (mV),qm [-]", ["0,1500,20", "1,-500,25", "2,0,30"]))
     assert table.units == {"time": "ms", "vir": "mV", "qm": ""}
     make_bundle(table, plan(columns={**MAP, "x": {"column": "qm", "unit": "mm"}}), tmp_path / "b")
@@ -117,7 +117,7 @@ def test_units_of_the_file_and_of_the_owner(tmp_path):
     assert found["x"] == pytest.approx([0.02, 0.025, 0.03], rel=1e-15)
 
 
-def test_an_axis_that_turns_and_is_driven_by_current(tmp_path):
+def test_current_driven_rotary_axis_is_imported(tmp_path):
     table = read(text(tmp_path / "a.csv", "time,vir [mA],qm [deg]", ["0,100,0", "0.1,200,90", "0.2,100,180"]))
     make_bundle(table, plan(parameters={"J": 2e-4}), tmp_path / "b")
     found = load_bundle(tmp_path / "b")
@@ -137,13 +137,13 @@ def test_an_axis_that_turns_and_is_driven_by_current(tmp_path):
         ('\ufeff"time [s]","a, b [V]"\n0,1\n1,2\n', {"time": [0, 1], "a, b": [1, 2]}),
     ],
 )
-def test_ways_to_write_a_csv(tmp_path, content, expected):
+def test_csv_dialects_are_read(tmp_path, content, expected):
     (tmp_path / "a.csv").write_text(content, encoding="utf-8", newline="")
     found = read(tmp_path / "a.csv").columns
     assert {name: values.tolist() for name, values in found.items()} == expected
 
 
-def test_a_csv_of_another_code_page(tmp_path):
+def test_csv_of_another_code_page_is_read(tmp_path):
     (tmp_path / "a.csv").write_bytes("time [s],x [\u00b5m]\n0,1\n1,2\n".encode("latin-1"))
     assert read(tmp_path / "a.csv").units == {"time": "s", "x": "\u00b5m"}
 
@@ -164,7 +164,7 @@ def test_a_csv_of_another_code_page(tmp_path):
         ([], "holds no rows"),
     ],
 )
-def test_bad_rows(tmp_path, rows, words):
+def test_invalid_row_is_named_in_the_error(tmp_path, rows, words):
     path = text(tmp_path / "a.csv", rows=rows)
     with pytest.raises(UserError, match=words):
         make_bundle(read(path), plan(), tmp_path / "b")
@@ -194,14 +194,14 @@ def test_bad_rows(tmp_path, rows, words):
         ({"case": {"other": float("nan")}}, "NaN and infinity are nothing"),
     ],
 )
-def test_bad_plans(tmp_path, given, words):
+def test_invalid_import_plan_is_refused(tmp_path, given, words):
     path = text(tmp_path / "a.csv")
     with pytest.raises(UserError, match=words):
         make_bundle(read(path), plan(**given), tmp_path / "b")
     assert not (tmp_path / "b").exists()
 
 
-def test_a_rate_where_there_is_no_time(tmp_path):
+def test_rate_replaces_a_missing_time_column(tmp_path):
     made = make_bundle(
         read(text(tmp_path / "a.csv")), plan(columns={"u": "vir", "x": "qm"}, rate="1 kHz"), tmp_path / "b"
     )
@@ -209,7 +209,7 @@ def test_a_rate_where_there_is_no_time(tmp_path):
     assert load_bundle(tmp_path / "b").columns["t"] == pytest.approx(T, abs=1e-12)
 
 
-def test_an_uneven_clock_that_may_be(tmp_path):
+def test_uneven_clock_is_kept_on_request(tmp_path):
     t = np.cumsum(np.random.default_rng(1).uniform(0.2e-3, 1.8e-3, N))
     np.savez(tmp_path / "a.npz", time=t, vir=U, qm=X)
     made = make_bundle(read(tmp_path / "a.npz"), plan(uneven=True), tmp_path / "b")
@@ -217,13 +217,13 @@ def test_an_uneven_clock_that_may_be(tmp_path):
     assert load_record(tmp_path / "b").case.sample_rate is None
 
 
-def test_columns_that_differ_in_length(tmp_path):
+def test_columns_of_different_length_are_refused(tmp_path):
     np.savez(tmp_path / "a.npz", time=T, vir=U, qm=X[:-1])
     with pytest.raises(UserError, match="column 'qm' has 2499 rows where 'time' has 2500"):
         make_bundle(read(tmp_path / "a.npz"), plan(), tmp_path / "b")
 
 
-def test_what_is_no_archive_and_what_is_no_file(tmp_path):
+def test_damaged_archive_and_folder_are_refused(tmp_path):
     (tmp_path / "a.npz").write_bytes(b"x" * 3000)
     with pytest.raises(UserError, match="cannot be read as npz: it is no archive of arrays"):
         read(tmp_path / "a.npz")
@@ -231,14 +231,14 @@ def test_what_is_no_archive_and_what_is_no_file(tmp_path):
         read(tmp_path)
 
 
-def test_an_existing_bundle_stays(tmp_path):
+def test_existing_bundle_is_not_overwritten(tmp_path):
     table = read(text(tmp_path / "a.csv"))
     make_bundle(table, plan(), tmp_path / "b")
     with pytest.raises(UserError, match="already holds recording"):
         make_bundle(table, plan(), tmp_path / "b")
 
 
-def test_structs_matrices_and_time_stamps(tmp_path):
+def test_structs_matrices_and_time_stamps_are_columns(tmp_path):
     savemat(tmp_path / "a.mat", {"log": {"y": np.column_stack((U, X)), "t": T[:, None]}, "gain": 3.0, "who": "me"})
     found = read(tmp_path / "a.mat").columns
     assert set(found) == {"log.y.1", "log.y.2", "log.t"} and np.array_equal(found["log.y.2"], X)
@@ -249,25 +249,25 @@ def test_structs_matrices_and_time_stamps(tmp_path):
     assert table.times("at", 1.0) == pytest.approx(T, abs=1e-12)
 
 
-def test_matlab_7_3(tmp_path):
+def test_matlab_7_3_file_is_read(tmp_path):
     h5py = pytest.importorskip("h5py")
     path = tmp_path / "a.mat"
     with h5py.File(path, "w", userblock_size=512) as file:
         for name, values in {"time": T, "vir": U, "qm": X}.items():
-            file.create_dataset(f"log/{name}", data=values[None, :])  # a column in MATLAB
+            file.create_dataset(f"log/{name}", data=values[None, :])  # column vector in MATLAB
         file.create_dataset("#refs#/a", data=T)
     table = read(path)
     assert set(table.columns) == {"log.time", "log.vir", "log.qm"} and np.array_equal(table.columns["log.qm"], X)
 
 
-def test_matlab_7_3_without_its_package(tmp_path, monkeypatch):
+def test_matlab_7_3_without_its_package_is_an_error(tmp_path, monkeypatch):
     (tmp_path / "a.mat").write_bytes(b"MATLAB 7.3 MAT-file".ljust(512) + b"\x89HDF\r\n\x1a\n")
     monkeypatch.setitem(sys.modules, "h5py", None)
     with pytest.raises(UserError, match=r"version 7.3 .*pip install 'rtctl\[hdf5\]'; or save it with -v7"):
         read(tmp_path / "a.mat")
 
 
-def test_mcap_without_its_package(tmp_path, monkeypatch):
+def test_mcap_without_its_package_is_an_error(tmp_path, monkeypatch):
     (tmp_path / "a.mcap").write_bytes(b"x")
     for name in [*sys.modules, "mcap"]:
         if name.partition(".")[0] == "mcap":
@@ -277,7 +277,7 @@ def test_mcap_without_its_package(tmp_path, monkeypatch):
         read(tmp_path / "a.mcap")
 
 
-def test_topics_of_their_own(tmp_path):
+def test_each_mcap_topic_has_a_separate_clock(tmp_path):
     writer_of = pytest.importorskip("mcap.writer")
     with (tmp_path / "a.mcap").open("wb") as file:
         writer = writer_of.Writer(file)
@@ -297,7 +297,7 @@ def test_topics_of_their_own(tmp_path):
 @example(content=b"\x80\r")
 @example(content=b"a\n" + b"1\n" * 40_000 + b"\x80\n")
 @given(content=st.binary(max_size=200))
-def test_damaged_files_are_refused_in_words(tmp_path_factory, suffix, content):
+def test_damaged_files_give_an_error_message(tmp_path_factory, suffix, content):
     if suffix == ".mcap":
         pytest.importorskip("mcap")
     path = tmp_path_factory.mktemp("d") / f"a{suffix}"
@@ -308,7 +308,7 @@ def test_damaged_files_are_refused_in_words(tmp_path_factory, suffix, content):
         assert str(path) in str(error)
 
 
-def test_what_is_no_file(tmp_path):
+def test_missing_file_and_unknown_format_are_refused(tmp_path):
     with pytest.raises(UserError, match="no such file"):
         read(tmp_path / "a.csv")
     (tmp_path / "a.xlsx").write_bytes(b"x")
@@ -316,7 +316,7 @@ def test_what_is_no_file(tmp_path):
         read(tmp_path / "a.xlsx")
 
 
-def test_a_map_file_and_options_on_top(tmp_path):
+def test_options_override_the_map_file(tmp_path):
     path = tmp_path / "log.yaml"
     path.write_text("plant: axis\ncolumns:\n  u: vir\n  x: {column: qm, unit: mm}\ncase: {drive: {limit_volt: 10}}\n")
     found = with_options(
@@ -340,7 +340,7 @@ def test_a_map_file_and_options_on_top(tmp_path):
         ("columns: [x]", r"log.yaml:1"),
     ],
 )
-def test_bad_map_files(tmp_path, content, words):
+def test_invalid_map_file_is_refused(tmp_path, content, words):
     (tmp_path / "log.yaml").write_text(content)
     with pytest.raises(UserError, match=words):
         load_plan(tmp_path / "log.yaml")
@@ -358,7 +358,7 @@ def test_bad_map_files(tmp_path, content, words):
         ({"rate": "fast"}, "--rate"),
     ],
 )
-def test_bad_options(options, words):
+def test_invalid_import_options_are_refused(options, words):
     given = {"plant": None, "maps": [], "units": [], "rate": None, "parameters": [], "case": [], "uneven": False}
     with pytest.raises(UserError, match=words):
         with_options(Plan(), **{**given, **options})

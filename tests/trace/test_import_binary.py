@@ -1,4 +1,4 @@
-"""Binary formats: each column with its type and unit, or named in the refusal; sizes before memory."""
+"""Binary formats: type and unit of each column, refused columns, and size limits before memory is allocated."""
 
 import struct
 import zlib
@@ -55,12 +55,12 @@ def test_elements_of_struct_arrays_and_cells_are_columns(tmp_path):
     assert load_bundle(tmp_path / "b").columns["x"] == pytest.approx(2e-3 * X, rel=1e-14)
 
 
-def test_units_beside_the_signals_at_any_level(tmp_path):
+def test_units_next_to_signals_are_read_at_any_level(tmp_path):
     savemat(tmp_path / "a.mat", {"log": {"x": X, "y": np.column_stack((X, T)), "units": {"x": "mm", "y": "V"}}})
     assert read(tmp_path / "a.mat").units == {"log.x": "mm", "log.y.1": "V", "log.y.2": "V"}
 
 
-def test_what_matlab_holds_besides_matrices_of_doubles(tmp_path):
+def test_matlab_types_other_than_double_matrices(tmp_path):
     found = {
         "i8": (100 * X).astype("i1"), "b": X > 0.1, "simulink": X.reshape(1, 1, N), "cube": np.zeros((2, 3, N)),
         "s": sparse.csc_matrix(X[:, None]), "numbers": cell(*map(float, range(N))), "z": X + 1j * T, "word": "abc",
@@ -90,7 +90,7 @@ def variable(kind, shape, name, data):
 HEAD = b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM"
 
 
-def test_a_datetime_of_matlab_is_refused_by_name_and_class(tmp_path):
+def test_matlab_datetime_is_refused_with_name_and_class(tmp_path):
     ids = element(14, variable(13, (6, 1), b"", element(6, struct.pack("<6I", 0xDD000000, 2, 1, 1, 1, 1))))
     parts = element(6, struct.pack("<II", 17, 0)) + element(1, b"when") + element(1, b"MCOS") + element(1, b"datetime")
     x = element(14, variable(6, (1, N), b"x", element(9, X.tobytes())))
@@ -104,7 +104,7 @@ def test_a_datetime_of_matlab_is_refused_by_name_and_class(tmp_path):
 
 
 @pytest.mark.parametrize("claim", ["tag", "shape"])
-def test_a_matlab_file_that_unpacks_to_too_much_is_refused_by_its_tags(tmp_path, small, claim):
+def test_matlab_file_that_unpacks_beyond_the_limit_is_refused_by_its_tags(tmp_path, small, claim):
     size = 16 << 20
     inner = variable(6, (1, size // 8), b"x", struct.pack("<II", 9, size))
     packed = zlib.compress(struct.pack("<II", 14, len(inner) + size) + inner + (bytes(size) if claim == "tag" else b""))
@@ -117,7 +117,7 @@ def test_a_matlab_file_that_unpacks_to_too_much_is_refused_by_its_tags(tmp_path,
 
 
 @pytest.mark.parametrize("version", ["4", "5"])
-def test_a_matlab_file_that_is_cut_off(tmp_path, version):
+def test_truncated_matlab_file_is_refused(tmp_path, version):
     savemat(tmp_path / "a.mat", {"t": T, "x": X}, format=version)
     whole = (tmp_path / "a.mat").read_bytes()
     assert set(read(tmp_path / "a.mat").columns) == {"t", "x"}
@@ -131,7 +131,7 @@ def h5():
     return pytest.importorskip("h5py")
 
 
-def test_struct_arrays_cells_units_and_text_of_version_7_3(h5, tmp_path):
+def test_struct_arrays_cells_units_and_text_of_matlab_7_3(h5, tmp_path):
     with h5.File(tmp_path / "a.mat", "w", userblock_size=512) as file:
         refs = [file.create_dataset(f"#refs#/{k}", data=v[None, :]) for k, v in zip("ab", (X, 2 * X), strict=True)]
         file.create_group("scope").create_group("signals")
@@ -155,7 +155,7 @@ def test_struct_arrays_cells_units_and_text_of_version_7_3(h5, tmp_path):
 # HDF5
 
 
-def test_hdf5_with_units_and_compounds(h5, tmp_path):
+def test_hdf5_units_and_compound_types_are_read(h5, tmp_path):
     with h5.File(tmp_path / "a.h5", "w") as file:
         file["log/x"] = X
         file["log/x"].attrs["units"] = "mm"
@@ -167,7 +167,7 @@ def test_hdf5_with_units_and_compounds(h5, tmp_path):
     assert table.left["away"] == "its data are in another file, which is not read"
 
 
-def test_hdf5_that_claims_gigabytes(h5, tmp_path):
+def test_hdf5_that_declares_gigabytes_is_refused(h5, tmp_path):
     with h5.File(tmp_path / "a.h5", "w") as file:
         file.create_dataset("x", (1 << 34,), "f8", chunks=(1 << 16,), compression="gzip")
     with pytest.raises(UserError, match="its data sets take 128 GiB in memory and 2 GiB"):
@@ -177,7 +177,7 @@ def test_hdf5_that_claims_gigabytes(h5, tmp_path):
 # numpy
 
 
-def test_types_of_numpy(tmp_path):
+def test_numpy_types_are_columns_or_named(tmp_path):
     stamps = np.datetime64("2026-01-01") + np.arange(N).astype("timedelta64[ms]")
     np.savez(tmp_path / "a.npz", at=stamps, o=np.array([1, "a"], object), z=1j * X, text=np.array(["1.5"] * N),
              rows=np.zeros(N, [("a", "f8"), ("b", "i4")]), m=np.asfortranarray(np.column_stack((T, X))))  # fmt: skip
@@ -191,14 +191,14 @@ def test_types_of_numpy(tmp_path):
         table.numbers("at", "x")
 
 
-def test_an_archive_that_claims_too_much_is_refused_by_its_directory(tmp_path, small):
+def test_npz_archive_beyond_the_limit_is_refused_by_its_directory(tmp_path, small):
     np.savez_compressed(tmp_path / "a.npz", x=np.zeros(4 << 20))
     assert (tmp_path / "a.npz").stat().st_size < 1 << 16
     with pytest.raises(UserError, match="its arrays take 32 MiB in memory and 1 MiB are taken at most"):
         read(tmp_path / "a.npz")
 
 
-def test_a_header_that_claims_more_than_is_there(tmp_path):
+def test_npy_header_that_declares_missing_data_is_refused(tmp_path):
     np.save(tmp_path / "a.npy", X)
     head = (tmp_path / "a.npy").read_bytes()
     (tmp_path / "a.npy").write_bytes(head.replace(b"(50,), }        ", b"(5000000000000,)"))
@@ -237,7 +237,7 @@ EXPECTED = {
 
 
 @pytest.mark.parametrize("kind", ["parquet", "feather"])
-def test_types_of_arrow(tmp_path, kind):
+def test_arrow_types_are_columns_or_named(tmp_path, kind):
     path = tmp_path / f"a.{kind}"
     (pq.write_table if kind == "parquet" else feather.write_feather)(arrow_table(), path)
     table = read(path)
@@ -255,20 +255,20 @@ def test_types_of_arrow(tmp_path, kind):
 
 
 @pytest.mark.parametrize("key", ["unit", "units"])
-def test_units_in_the_metadata_of_a_field(tmp_path, key):
+def test_units_are_read_from_field_metadata(tmp_path, key):
     field = pa.field("x", pa.float64(), metadata={key: "mm"})
     pq.write_table(pa.table({"x": X}, schema=pa.schema([field])), tmp_path / "a.parquet")
     assert read(tmp_path / "a.parquet").units == {"x": "mm"}
 
 
-def test_parquet_that_claims_too_much_is_refused_by_its_metadata(tmp_path, small):
+def test_parquet_beyond_the_limit_is_refused_by_its_metadata(tmp_path, small):
     pq.write_table(pa.table({name: np.zeros(1 << 18) for name in "abcd"}), tmp_path / "a.parquet")
     assert (tmp_path / "a.parquet").stat().st_size < 1 << 16
     with pytest.raises(UserError, match="its columns take 8 MiB in memory and 1 MiB are taken at most"):
         read(tmp_path / "a.parquet")
 
 
-def test_a_limit_that_is_no_number(monkeypatch):
+def test_invalid_import_limit_is_an_error(monkeypatch):
     monkeypatch.setenv(limits.VARIABLE, "much")
     with pytest.raises(UserError, match="RTCTL_IMPORT_GIB=much: it should be a number of GiB, such as 4"):
         limits.limit()
@@ -277,7 +277,7 @@ def test_a_limit_that_is_no_number(monkeypatch):
 # any
 
 
-def test_a_wrong_name_is_told_and_read_by_its_content(tmp_path):
+def test_file_with_a_wrong_extension_is_read_by_content_with_a_note(tmp_path):
     pq.write_table(pa.table({"t": T, "x": X}), tmp_path / "a.csv")
     with (tmp_path / "b.mat").open("wb") as file:
         np.savez(file, t=T)
@@ -288,7 +288,7 @@ def test_a_wrong_name_is_told_and_read_by_its_content(tmp_path):
     assert set(read(tmp_path / "b.mat").columns) == {"t"}
 
 
-def test_a_file_without_columns_says_what_is_in_it(tmp_path):
+def test_error_for_a_file_without_columns_lists_its_content(tmp_path):
     savemat(tmp_path / "a.mat", {"gain": 3.0, "word": "abc"})
     with pytest.raises(
         UserError, match=r"a.mat has no column of numbers; gain is one value and no column; word is text"

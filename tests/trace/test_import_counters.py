@@ -1,4 +1,4 @@
-"""Counters that wrap are unwrapped by the counts of a turn or a power of two, or told."""
+"""Counter wrap: unwrapped by counts per turn or by a power of two, otherwise reported."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ def wrapped(values, modulus, lowest=0):
     ("modulus", "lowest", "told"),
     [(1000, 0, [1000.0]), (2048, 0, []), (65536, -32768, []), (65536, 0, []), (4096, 0, [2000.0]), (2**32, 0, [])],
 )
-def test_a_wrap_is_taken_out_and_told(name, modulus, lowest, told):
+def test_counter_wrap_is_removed_and_noted(name, modulus, lowest, told):
     counts = TRUE[name] + (modulus + lowest - 100 if modulus > 5000 else 0)
     seen = wrapped(counts, modulus, lowest)
     found = unwrapped("x_counts", seen, told)
@@ -38,7 +38,7 @@ def test_a_wrap_is_taken_out_and_told(name, modulus, lowest, told):
     assert found.note.startswith(f"x_counts wraps at {modulus} counts: ")
 
 
-def test_a_modulus_that_nobody_told_is_told_in_a_note():
+def test_unknown_modulus_is_noted_and_the_counts_are_kept():
     seen = wrapped(TRUE["steady"], 1000)
     found = unwrapped("x_counts", seen)
     assert found.counts is seen
@@ -52,12 +52,12 @@ def test_a_modulus_that_nobody_told_is_told_in_a_note():
         np.cumsum(np.random.default_rng(3).integers(-50, 50, 2000)).astype(float),
     ],
 )  # fmt: skip
-def test_a_counter_that_does_not_wrap_stays_as_it_is(values):
+def test_counter_without_a_wrap_is_unchanged(values):
     found = unwrapped("x_counts", values)
     assert found.counts is values and found.note == ""
 
 
-def test_import_unwraps_by_the_cases_counts_per_turn(tmp_path):
+def test_import_unwraps_by_the_counts_per_turn_of_the_case(tmp_path):
     angle = 7 * K
     columns = {"t": K / 500, "u1": np.sin(K / 9.0), "u2": np.cos(K / 9.0), "ref": 0.0 * K,
                "capstan_counts": angle % 2000, "reel1_counts": angle, "reel2_counts": angle}  # fmt: skip

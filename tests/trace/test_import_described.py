@@ -39,7 +39,7 @@ TURN = 2 * np.pi * np.sin(T)
 
 @pytest.fixture
 def bench(tmp_path):
-    """A function that writes a log and a description and imports them."""
+    """`bench(columns, maps, description)` writes a log and a machine description and imports them."""
 
     def make(columns, maps=(), text=BELT, units=(), case=(), **more):
         log, machine = tmp_path / "log.csv", tmp_path / "belt.yaml"
@@ -60,7 +60,7 @@ def columns(**more):
 MAPS = ["t=time,u=volts,encoder_counts=pos"]
 
 
-def test_bundle_of_format_2(bench):
+def test_import_with_a_description_makes_a_bundle_of_format_2(bench):
     made, bundle = bench(columns(), MAPS)
     assert made.rate == 500.0
     assert bundle.case["format"] == 2
@@ -71,18 +71,18 @@ def test_bundle_of_format_2(bench):
     assert any("no column of sensor scale" in note for note in made.notes)
 
 
-def test_tolerance_and_physics_of_a_config(bench):
+def test_tolerance_and_physics_of_a_config_are_kept(bench):
     _, bundle = bench(columns(), MAPS, CONFIG, case=["tolerance.bodies.motor.dry=0.5"])
     assert bundle.case["tolerance"] == {"default": 0.1, "joints.belt.ratio": 0, "bodies.motor.dry": 0.5}
     assert bundle.case["physics"] == [{"term": "friction.viscous", "node": "carriage", "B": 3.0}]
 
 
-def test_names_of_drives_and_sensors_are_as_good_as_columns(bench):
+def test_drive_and_sensor_names_can_replace_column_names(bench):
     _, bundle = bench(columns(), ["t=time,amplifier=volts,encoder=pos"])
     assert set(bundle.columns) == {"t", "u", "encoder_counts"}
 
 
-def test_units_of_the_log_become_those_of_the_description(bench):
+def test_log_units_are_converted_to_those_of_the_description(bench):
     log = columns(pos=np.round(8000 * np.sin(T)) * 360 / 8000, way=0.0127 * TURN, volts=1000 * np.cos(T))
     made, bundle = bench(log, [*MAPS, "scale_mm=way"], units=["encoder_counts=deg", "scale=m", "u=mV"])
     np.testing.assert_allclose(bundle.columns["encoder_counts"], np.round(8000 * np.sin(T)), atol=0)
@@ -115,14 +115,14 @@ def test_units_of_the_log_become_those_of_the_description(bench):
         ({"pos_deg": np.round(TURN)}, ["t=time,u=volts,encoder=pos_deg"], [], "--unit encoder_counts=deg if it is deg"),
     ],
 )
-def test_refusals(bench, tmp_path, log, maps, units, sentence):
+def test_invalid_import_is_refused(bench, tmp_path, log, maps, units, sentence):
     with pytest.raises(UserError) as error:
         bench(columns(**log), maps, units=units)
     assert sentence in str(error.value)
     assert not (tmp_path / "bench").exists()
 
 
-def test_a_plant_is_no_description(bench):
+def test_plant_name_is_not_a_description(bench):
     with pytest.raises(UserError, match="--plant goes without --machine"):
         bench(columns(), MAPS, plant="axis")
 
@@ -140,13 +140,13 @@ def test_a_plant_is_no_description(bench):
         (CONFIG.replace("friction.viscous", "friction.viscos"), "there is no term 'friction.viscos'; did you mean"),
     ],
 )
-def test_refused_descriptions_name_file_and_line(bench, text, sentence):
+def test_invalid_description_error_names_file_and_line(bench, text, sentence):
     with pytest.raises(UserError) as error:
         bench(columns(), MAPS, text)
     assert sentence in str(error.value)
 
 
-def test_command(bench, tmp_path):
+def test_import_command_with_a_machine_description(bench, tmp_path):
     bench(columns(), MAPS)
     log, machine, out = (str(tmp_path / name) for name in ("log.csv", "belt.yaml", "other"))
     done = CliRunner().invoke(app, ["import", log, "--machine", machine, "--map", MAPS[0], "-o", out, "--json"])
@@ -156,17 +156,17 @@ def test_command(bench, tmp_path):
     assert told["lacks"] is None
 
 
-def test_an_assumed_unit_is_told_of_what_has_one(bench):
+def test_note_on_assumed_units_lists_only_columns_with_a_unit(bench):
     text = BELT.replace("column: u, ", "column: u, enabled: power, ")
     made, _ = bench(columns(power=np.ones(100)), MAPS, text)
     assert next(note for note in made.notes if "assumed" in note).startswith("no unit is given: u in V assumed")
 
 
-def test_an_empty_reference_is_none(bench):
+def test_empty_reference_is_not_imported(bench):
     _, bundle = bench(columns(ref=np.full(100, np.nan), w=np.zeros(100)), MAPS)
     assert set(bundle.columns) == {"t", "u", "encoder_counts", "w"}
 
 
-def test_a_minus_is_no_part_of_a_unit(bench):
+def test_negative_scale_does_not_change_the_unit(bench):
     made, _ = bench(columns(way=-12.7 * TURN), [*MAPS, "scale_mm=way"], BELT.replace("1000,", "-1000,"))
     assert made.columns["scale_mm"] == "mm"

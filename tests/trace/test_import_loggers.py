@@ -1,4 +1,4 @@
-"""MDF and TDMS: units, groups, clocks of their own; what rtctl exports comes back the same."""
+"""MDF and TDMS: units, groups, separate clocks; round trip of exported files."""
 
 import sys
 
@@ -21,7 +21,7 @@ READ = [name for name, form in FORMATS.items() if form.suffix in READERS]
 
 
 def bundle(folder, rows=2500):
-    """A bundle of an axis with every column of one, units in the file, numbers with all their digits."""
+    """A bundle with every column of an axis, units in the file, numbers of full precision."""
     columns = known_columns("axis")
     values = {name: np.sin(np.arange(rows) * 0.01 + k) for k, name in enumerate(columns)}
     values["t"] = np.arange(rows) / 1000
@@ -34,7 +34,7 @@ def bundle(folder, rows=2500):
 
 
 @pytest.mark.parametrize("to", READ)
-def test_what_is_exported_is_imported_to_the_same_numbers_and_units(tmp_path, to):
+def test_exported_files_import_with_equal_numbers_and_units(tmp_path, to):
     if FORMATS[to].package:
         pytest.importorskip(FORMATS[to].package)
     path = export(bundle(tmp_path / "a"), to, tmp_path / f"a{FORMATS[to].suffix}").path
@@ -46,8 +46,8 @@ def test_what_is_exported_is_imported_to_the_same_numbers_and_units(tmp_path, to
     assert made.rate == 1000.0 and made.notes == ()
 
 
-def test_every_export_has_a_reader():
-    assert set(FORMATS) - set(READ) == {"rrd"}  # Rerun shows it; what is to be read again goes to mcap
+def test_every_export_format_except_rerun_can_be_imported():
+    assert set(FORMATS) - set(READ) == {"rrd"}  # export to Rerun is for viewing only
 
 
 @pytest.fixture
@@ -65,7 +65,7 @@ def mdf(tmp_path):
     return write
 
 
-def test_groups_of_mdf_with_one_clock_are_one(mdf, tmp_path):
+def test_mdf_groups_of_one_clock_are_merged(mdf, tmp_path):
     table = read(mdf(("a", T, [("u", X, "V", {})]), ("b", T, [("x", X, "mm", {}), ("n", np.arange(100), "", {})])))
     assert set(table.columns) == {"time", "u", "x", "n"} and table.clock == "time" and table.notes == ()
     assert table.units == {"time": "s", "u": "V", "x": "mm"} and table.columns["n"].dtype.kind == "i"
@@ -73,7 +73,7 @@ def test_groups_of_mdf_with_one_clock_are_one(mdf, tmp_path):
     assert load_bundle(tmp_path / "b").columns["x"] == pytest.approx(X / 1e3, rel=1e-14)
 
 
-def test_groups_of_mdf_with_clocks_of_their_own_are_named(mdf, tmp_path):
+def test_mdf_groups_with_separate_clocks_are_prefixed(mdf, tmp_path):
     table = read(mdf(("fast", T, [("x", X, "mm", {})]), ("slow", T[::10], [("x", X[::10], "V", {})])))
     assert set(table.columns) == {"fast/time", "fast/x", "slow/time", "slow/x"} and table.clock == ""
     assert table.notes[0].startswith("its channel groups have clocks of their own: fast (100 rows), slow (10 rows)")
@@ -81,14 +81,14 @@ def test_groups_of_mdf_with_clocks_of_their_own_are_named(mdf, tmp_path):
         make_bundle(table, Plan(plant="axis", columns={"t": "fast/time", "x": "slow/x"}), tmp_path / "b")
 
 
-def test_invalid_values_of_mdf_are_no_numbers(mdf):
+def test_invalid_mdf_values_become_nan(mdf):
     invalid = np.arange(100) == 7
     table = read(mdf(("a", T, [("x", X, "mm", {"invalidation_bits": invalid})])))
     with pytest.raises(UserError, match="column 'x', row 7: empty or nan"):
         table.numbers("x", "x")
 
 
-def test_mdf_and_tdms_that_claim_too_much(mdf, tdms, monkeypatch):
+def test_mdf_and_tdms_beyond_the_limit_are_refused(mdf, tdms, monkeypatch):
     t = np.arange(200_000) / 1000
     paths = mdf(("a", t, [("x", 0 * t, "", {})])), tdms({"g": {"x": (np.zeros(200_000), {})}})
     monkeypatch.setenv(limits.VARIABLE, str(2**-10))
@@ -117,20 +117,20 @@ def wave(step, unit="mm", start=0.0):
     return {"unit_string": unit, "wf_increment": step, "wf_start_offset": start}
 
 
-def test_waveforms_of_tdms_have_their_clock(tdms, tmp_path):
+def test_tdms_waveforms_have_a_clock(tdms, tmp_path):
     table = read(tdms({"g": {"x": (X, wave(0.01, start=2.0)), "u": (X, wave(0.01, "V", 2.0))}}))
     assert table.clock == "wf_time" and table.units == {"x": "mm", "u": "V", "wf_time": "s"}
     made = make_bundle(table, Plan(plant="axis"), tmp_path / "b")
     assert made.rate == 100.0 and load_bundle(tmp_path / "b").columns["t"][[0, -1]].tolist() == [2.0, 2.99]
 
 
-def test_waveforms_of_tdms_with_clocks_of_their_own_are_named(tdms):
+def test_tdms_waveforms_with_separate_clocks_are_prefixed(tdms):
     table = read(tdms({"g": {"x": (X, wave(0.01))}, "h": {"u": (X[::10], wave(0.1))}}))
     assert set(table.columns) == {"g/x", "h/u", "g/x.wf_time", "h/u.wf_time"} and table.clock == ""
     assert "g/x 100 Hz (100 rows), h/u 10 Hz (10 rows)" in table.notes[0]
 
 
-def test_time_stamps_and_empty_channels_of_tdms(tdms):
+def test_tdms_time_stamps_and_empty_channels(tdms):
     stamps = np.datetime64("2026-01-01") + (T * 1e6).round().astype("timedelta64[us]")
     table = read(tdms({"g": {"at": (stamps, {}), "none": (np.empty(0), {})}}))
     assert table.times("at", 1.0) == pytest.approx(T, abs=1e-9) and table.left == {"none": "empty"}
@@ -140,7 +140,7 @@ def test_time_stamps_and_empty_channels_of_tdms(tdms):
     ("name", "package", "extra"),
     [("a.mf4", "asammdf", "'rtctl[mf4]'"), ("a.tdms", "nptdms", "'rtctl[tdms]'"), ("a.h5", "h5py", "'rtctl[hdf5]'")],
 )
-def test_a_package_that_is_missing_is_named_with_its_extra(tmp_path, monkeypatch, name, package, extra):
+def test_missing_package_error_names_the_extra(tmp_path, monkeypatch, name, package, extra):
     (tmp_path / name).write_bytes(b"x")
     for module in [*sys.modules, package]:
         if module.partition(".")[0] == package:
@@ -155,8 +155,8 @@ def test_a_package_that_is_missing_is_named_with_its_extra(tmp_path, monkeypatch
 
 @pytest.mark.parametrize("name", ["a.mf4", "a.tdms", "a.h5", "a.json", "a.jsonl", "a.npy", "a.feather", "a.csv.gz"])
 @pytest.mark.parametrize("share", [0.0, 0.3, 0.97])
-def test_damaged_files_are_refused_in_words(tmp_path, name, share, request):
-    """Each file cut off, and with its second half overwritten: no error but one for people."""
+def test_damaged_mdf_and_tdms_files_give_an_error_message(tmp_path, name, share, request):
+    """Each file truncated, and with its second half overwritten: only a UserError is raised."""
     whole = make_file(tmp_path / name, request)
     cut = int(share * len(whole))
     for content in (whole[:cut], whole[:cut] + b"\xa5" * (len(whole) - cut)):

@@ -1,4 +1,4 @@
-"""JSON and MCAP: nested names, lists, stamps, gaps; whatever is whole of a file that is cut off; packed files."""
+"""JSON and MCAP: nested names, lists, time stamps, gaps, truncated files, compressed files."""
 
 import bz2
 import gzip
@@ -34,7 +34,7 @@ def as_lines(path, found):
 
 
 def message(k):
-    """As a joint state of ROS 2."""
+    """A joint state message of ROS 2."""
     stamp = {"sec": EPOCH + k // 10, "nanosec": 100_000_000 * (k % 10)}
     return {
         "header": {"stamp": stamp, "frame_id": "base"},
@@ -44,7 +44,7 @@ def message(k):
     }
 
 
-def test_nested_names_lists_and_stamps_are_columns(tmp_path):
+def test_nested_names_lists_and_time_stamps_are_columns(tmp_path):
     table = read(as_lines(tmp_path / "a.jsonl", map(message, range(N))))
     assert set(table.columns) == {"header.stamp", "position.1", "position.2", "text", "ok"}
     assert table.columns["header.stamp"][11].astype(np.int64) == (EPOCH + 1) * 10**9 + 10**8
@@ -57,13 +57,13 @@ def test_nested_names_lists_and_stamps_are_columns(tmp_path):
 @pytest.mark.parametrize(
     "stamp", [{"secs": 5, "nsecs": 7}, {"sec": 5, "nsec": 7}, {"seconds": 5, "nanos": 7}, {"sec": 5, "nanosec": 7}]
 )
-def test_spellings_of_a_stamp(tmp_path, stamp):
+def test_spellings_of_a_time_stamp(tmp_path, stamp):
     table = read(as_lines(tmp_path / "a.jsonl", [{"at": stamp, "x": k, **stamp} for k in range(3)]))
     assert table.columns["at"].astype(np.int64).tolist() == [5_000_000_007] * 3
     assert table.columns["stamp"].dtype == "timedelta64[ns]"
 
 
-def test_fields_that_some_messages_lack_are_named(tmp_path):
+def test_fields_missing_in_some_messages_are_named(tmp_path):
     found = [row if k % 5 else {"t": row["t"]} for k, row in enumerate(rows())]
     table = read(as_lines(tmp_path / "a.jsonl", found))
     assert table.notes == ("x is missing in 10 of 50 lines",)
@@ -87,7 +87,7 @@ def test_fields_that_some_messages_lack_are_named(tmp_path):
         ),
     ],
 )
-def test_documents(tmp_path, found, names, indent):
+def test_json_documents_are_read(tmp_path, found, names, indent):
     table = read(written(tmp_path / "a.json", found, indent=indent))
     assert list(table.columns) == names
     assert set(table.units.values()) <= {"mm"} and (table.units != {}) == ("mm" in json.dumps(found))
@@ -104,13 +104,13 @@ def test_documents(tmp_path, found, names, indent):
         (json.dumps([["t", "x"], [0, 1], [1, 2, 3]]), "row 2 has 3 values where there are 2 names"),
     ],
 )
-def test_json_that_is_damaged(tmp_path, text, words):
+def test_damaged_json_is_refused(tmp_path, text, words):
     (tmp_path / "a.json").write_text(text)
     with pytest.raises(UserError, match=words):
         read(tmp_path / "a.json")
 
 
-def test_lines_that_are_cut_off_give_what_is_whole(tmp_path):
+def test_truncated_json_lines_give_the_complete_lines(tmp_path):
     (tmp_path / "a.jsonl").write_text("\n".join(map(json.dumps, rows()))[:-5])
     table = read(tmp_path / "a.jsonl")
     assert len(table.columns["t"]) == N - 1
@@ -120,7 +120,7 @@ def test_lines_that_are_cut_off_give_what_is_whole(tmp_path):
 @pytest.mark.parametrize(
     ("suffix", "pack"), [(".gz", gzip.compress), (".bz2", bz2.compress), (".xz", lzma.compress), ("", gzip.compress)]
 )
-def test_packed_files(tmp_path, suffix, pack):
+def test_compressed_files_are_read(tmp_path, suffix, pack):
     path = tmp_path / f"a.csv{suffix}"
     path.write_bytes(pack(b"t,u,x\n" + b"".join(b"%d,%d,1\n" % (k, k) for k in range(9)) + b"9,oops,1\n"))
     table = read(path)
@@ -132,7 +132,7 @@ def test_packed_files(tmp_path, suffix, pack):
         read(path)
 
 
-def test_a_packed_file_that_unpacks_to_too_much(tmp_path, monkeypatch):
+def test_compressed_file_that_unpacks_beyond_the_limit_is_refused(tmp_path, monkeypatch):
     monkeypatch.setenv(limits.VARIABLE, str(2**-10))
     (tmp_path / "a.csv.gz").write_bytes(gzip.compress(b"t,x\n" + b"0,1\n" * (1 << 20)))
     with pytest.raises(UserError, match=r"a.csv.gz: its unpacked bytes, and more, take .* MiB in memory and 1 MiB"):
@@ -144,7 +144,7 @@ def test_a_packed_file_that_unpacks_to_too_much(tmp_path, monkeypatch):
 
 @pytest.fixture
 def mcap(tmp_path):
-    """Writes messages {topic: (encoding, [bytes])} at 10 ms from each other."""
+    """`mcap` writes messages {topic: (encoding, [bytes])} at intervals of 10 ms."""
     writers = pytest.importorskip("mcap.writer")
 
     def write(topics, compression="ZSTD", chunk=4096, schema=None):
@@ -171,7 +171,7 @@ def as_json(found):
 
 
 @pytest.mark.parametrize("compression", ["NONE", "ZSTD", "LZ4"])
-def test_mcap_that_is_cut_off_gives_what_is_whole(mcap, tmp_path, compression):
+def test_truncated_mcap_gives_the_complete_messages(mcap, tmp_path, compression):
     path = mcap({"/axis": as_json([{"u": k % 7 / 3, "x": k} for k in range(2000)])}, compression)
     assert len(read(path).columns["x"]) == 2000 and read(path).notes == ()
     whole = path.read_bytes()
@@ -191,7 +191,7 @@ def test_mcap_that_is_cut_off_gives_what_is_whole(mcap, tmp_path, compression):
         read(path)
 
 
-def test_mcap_in_cdr_says_what_it_is(mcap):
+def test_mcap_in_cdr_is_refused_by_name(mcap):
     with pytest.raises(UserError, match=(
         r"a.mcap has no messages in JSON or protobuf, which can be read; it has /JointState: 5 messages in cdr, schema "
         r"sensor_msgs/msg/JointState \(ros2msg\); decode them with mcap-ros2-support"
@@ -199,7 +199,7 @@ def test_mcap_in_cdr_says_what_it_is(mcap):
         read(mcap({"/JointState": ("cdr", [b"\0" * 20] * 5)}))
 
 
-def test_topics_that_are_no_json_are_named_beside_those_that_are(mcap):
+def test_topics_of_other_encodings_are_named_next_to_json_topics(mcap):
     table = read(mcap({"/axis": as_json(rows()), "/tf": ("protobuf", [b"x"] * 3)}))
     assert table.notes == ("/tf is no column: 3 messages in protobuf, schema sensor_msgs/msg/tf (ros2msg)",)
     with pytest.raises(UserError, match=r"'/tf' .* is no column: 3 messages in protobuf"):
@@ -246,7 +246,7 @@ def protobuf_mcap(tmp_path):
     return write
 
 
-def test_protobuf_messages_of_any_shape(protobuf_mcap):
+def test_protobuf_messages_of_any_shape_are_read(protobuf_mcap):
     fields = [
         ("a", "DOUBLE", ""),
         ("n", "INT64", ""),
@@ -265,12 +265,12 @@ def test_protobuf_messages_of_any_shape(protobuf_mcap):
     assert table.left == {"s": "text ('on')"} and table.clock == "log_time"
 
 
-def test_protobuf_that_is_damaged(protobuf_mcap):
+def test_damaged_protobuf_is_refused(protobuf_mcap):
     with pytest.raises(UserError, match=r"the descriptor of /row has no message pkg.Row"):
         read(protobuf_mcap([("a", "DOUBLE", "")], [{"a": 1.0}], spoil=lambda data: data[:-9]))
 
 
-def test_units_and_stamps_of_mcap(mcap, tmp_path):
+def test_mcap_units_and_time_stamps_are_read(mcap, tmp_path):
     schema = {"properties": {"a": {"type": "object", "properties": {"x": {"type": "number", "unit": "mm"}}}}}
     found = [{"a": {"x": k}, "u": k % 2, "stamp": {"sec": k, "nanosec": 5}} for k in range(N)]
     table = read(mcap({"/axis": as_json(found)}, schema=schema))
@@ -281,7 +281,7 @@ def test_units_and_stamps_of_mcap(mcap, tmp_path):
     assert bundle.columns["t"].tolist() == list(range(N)) and bundle.columns["x"] == pytest.approx(np.arange(N) / 1e3)
 
 
-def test_a_chunk_that_claims_too_much(mcap, monkeypatch):
+def test_mcap_chunk_beyond_the_limit_is_refused(mcap, monkeypatch):
     path = mcap({"/axis": as_json([{"x": 0, "pad": " " * 100_000}] * 40)}, chunk=1 << 22)
     monkeypatch.setenv(limits.VARIABLE, str(2**-10))
     assert path.stat().st_size < 1 << 16
@@ -289,6 +289,6 @@ def test_a_chunk_that_claims_too_much(mcap, monkeypatch):
         read(path)
 
 
-def test_a_message_that_is_no_json(mcap):
+def test_message_that_is_not_json_is_refused(mcap):
     with pytest.raises(UserError, match=r"message 2 of /axis is no JSON: b'\{"):
         read(mcap({"/axis": ("json", [b"{}", b"{"])}))

@@ -1,4 +1,4 @@
-"""Import of text: what stands where, decimal signs, dates, units in names and in rows, encodings, options."""
+"""Import of text: layout of names and rows, decimal signs, dates, units in names and in rows, encodings, options."""
 
 import gzip
 import re
@@ -53,7 +53,7 @@ TIME_U = {"time": [0, 1, 2], "u": [0.5, 1.5, 2.5]}
         "time u\n0 0.5D+00\n1 0.15D+01\n2 0.25d1\n",
     ],
 )
-def test_where_names_and_rows_stand(tmp_path, content):
+def test_lines_of_names_units_and_rows_are_found(tmp_path, content):
     assert values(columns(tmp_path, content)) == TIME_U
 
 
@@ -61,7 +61,7 @@ def test_where_names_and_rows_stand(tmp_path, content):
     ("content", "expected"),
     [
         ("t;x\n0;0,998\n1;1.000,5\n2;1.001\n", [0.998, 1000.5, 1001]),
-        ("t;x\n0;998\n1;1.000\n2;1.001,25\n", [998, 1000, 1001.25]),  # what decides stands last
+        ("t;x\n0;998\n1;1.000\n2;1.001,25\n", [998, 1000, 1001.25]),  # the last line decides
         ("t;x\n0;1.234.567\n1;1.000\n2;7\n", [1234567, 1000, 7]),
         ("t\tx\n0\t1,980\n1\t1,981.5\n2\t12\n", [1980, 1981.5, 12]),
         ("t;x\n0;1 234,5\n1;1'234,5\n2;1\u202f234,5\n", [1234.5, 1234.5, 1234.5]),
@@ -71,12 +71,12 @@ def test_where_names_and_rows_stand(tmp_path, content):
         ('t,x\n0,"1,980"\n1,"1,981.5"\n2,12\n', [1980, 1981.5, 12]),
     ],
 )
-def test_one_decimal_sign_for_the_whole_file(tmp_path, content, expected):
+def test_one_decimal_sign_holds_for_the_whole_file(tmp_path, content, expected):
     assert values(columns(tmp_path, content))["x"] == pytest.approx(expected, rel=1e-15)
 
 
 @pytest.mark.parametrize("text", ["1,980", "1.980", "-12,000"])
-def test_what_is_ambiguous_is_refused_and_decided_by_the_owner(tmp_path, text):
+def test_ambiguous_decimal_sign_needs_an_option(tmp_path, text):
     content = f"t;x\n0;{text}\n1;{text}\n"
     sign = "," if "," in text else "."
     with pytest.raises(UserError, match=rf"a.csv: '{text}' \(line 2\) is .* nothing in the file says .*--decimal"):
@@ -86,7 +86,7 @@ def test_what_is_ambiguous_is_refused_and_decided_by_the_owner(tmp_path, text):
     assert (decimal, grouped) == (float(text.replace(",", ".")), float(text.replace(sign, "")))
 
 
-def test_decimal_signs_that_contradict_each_other(tmp_path):
+def test_contradictory_decimal_signs_are_refused(tmp_path):
     with pytest.raises(UserError, match=r"'0\.5' \(line 3\) has a decimal point and '0,25' \(line 2\) a decimal comma"):
         columns(tmp_path, "t;x\n0;0,25\n1;0.5\n")
 
@@ -125,7 +125,7 @@ def test_dates_become_seconds(tmp_path, content, step):
         ("t in ms,x\n0,1.5\n1,2.5\n", {"t in ms": "ms"}),
     ],
 )
-def test_units_of_the_file(tmp_path, content, units):
+def test_units_in_a_text_file_are_read(tmp_path, content, units):
     assert columns(tmp_path, content).units == units
 
 
@@ -133,7 +133,7 @@ def test_units_of_the_file(tmp_path, content, units):
     ("name", "unit", "ours"),
     [("time_ms", "ms", "t"), ("pos_mm", "mm", "x"), ("u_mV", "mV", "u"), ("angle_deg", "deg", "x")],
 )
-def test_a_unit_at_the_end_of_a_name_is_asked_about(tmp_path, name, unit, ours):
+def test_unit_suffix_of_a_name_must_be_confirmed(tmp_path, name, unit, ours):
     header = ",".join(name if column == ours else column for column in ("t", "u", "x"))
     table = columns(tmp_path, f"{header}\n0,0.5,0\n1,1.5,1\n2,2.5,2\n")
     plan = Plan(plant="axis", columns={c: ColumnPlan(column=name if c == ours else c) for c in "tux"})
@@ -150,7 +150,7 @@ def test_a_unit_at_the_end_of_a_name_is_asked_about(tmp_path, name, unit, ours):
         (("0", "1000", "2000"), "rows would be 1000 s apart"),
     ],
 )
-def test_a_time_that_cannot_be_in_seconds_is_asked_about(tmp_path, times, words):
+def test_time_that_cannot_be_in_seconds_needs_a_unit(tmp_path, times, words):
     table = columns(tmp_path, "t,u,x\n" + "".join(f"{t},1,2\n" for t in times))
     with pytest.raises(UserError, match=words):
         make_bundle(table, Plan(plant="axis"), tmp_path / "b")
@@ -160,7 +160,7 @@ def test_a_time_that_cannot_be_in_seconds_is_asked_about(tmp_path, times, words)
 
 
 @pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-8-sig", "cp1252"])
-def test_encodings(tmp_path, encoding):
+def test_text_encodings_are_read(tmp_path, encoding):
     text = "time [s];x [\u00b5m]\n0;0,5\n1;1,5\n"
     given = {"encoding": encoding} if encoding == "utf-16-le" else {}
     table = columns(tmp_path, text.encode(encoding), **given)
@@ -170,7 +170,7 @@ def test_encodings(tmp_path, encoding):
             columns(tmp_path, text.encode(encoding))
 
 
-def test_packed_text(tmp_path):
+def test_compressed_text_is_read(tmp_path):
     assert values(columns(tmp_path, gzip.compress(b"time,u\n0,0.5\n1,1.5\n2,2.5\n"), "a.csv.gz")) == TIME_U
 
 
@@ -193,12 +193,12 @@ def test_packed_text(tmp_path):
         (b"a,b\n\0\1\2\3,1\n", "is not text"),
     ],
 )
-def test_what_cannot_be_read_names_the_line_of_the_editor(tmp_path, content, words):
+def test_read_error_names_the_line_number_of_the_file(tmp_path, content, words):
     with pytest.raises(UserError, match=words):
         columns(tmp_path, content).numbers("u", "u")
 
 
-def test_the_owner_says_where_things_stand(tmp_path):
+def test_options_override_the_detected_layout(tmp_path):
     content = "1,2\nout,7\ntime,u\nms,V\n0,0.5\n1,1.5\n2,2.5\n"
     assert values(columns(tmp_path, content, skip=2)) == TIME_U
     named = columns(tmp_path, content, names_line=3, units_line=4)
@@ -219,13 +219,13 @@ def test_the_owner_says_where_things_stand(tmp_path):
         ({"encoding": "ascii"}, "a.csv:1: this is not ascii"),
     ],
 )
-def test_options_that_cannot_be(tmp_path, options, words):
+def test_invalid_text_options_are_refused(tmp_path, options, words):
     (tmp_path / "a.csv").write_text("t,\u00b5\n0,1\n1,2")
     with pytest.raises(UserError, match=words):
         read(tmp_path / "a.csv", with_options(Plan(), None, [], [], None, [], [], False, options).text)
 
 
-def test_options_of_text_for_another_file(tmp_path):
+def test_text_options_are_refused_for_other_formats(tmp_path):
     np.savez(tmp_path / "a.npz", x=np.arange(3.0))
     with pytest.raises(UserError, match=r"a.npz is read as npz, and --decimal applies only to text files"):
         read(tmp_path / "a.npz", TextPlan(decimal=","))
@@ -238,12 +238,12 @@ def test_options_of_text_for_another_file(tmp_path):
         (["u=Torque, Request,x=pos,t=a, b, c"], {"u": "Torque, Request", "x": "pos", "t": "a, b, c"}),
     ],
 )
-def test_a_name_with_a_comma(maps, found):
+def test_column_name_may_contain_a_comma(maps, found):
     plan = with_options(Plan(), "axis", maps, [], None, [], [], False)
     assert {name: column.column for name, column in plan.columns.items()} == found
 
 
-def test_a_comma_that_begins_no_pair_is_told(tmp_path):
+def test_column_list_without_an_equals_sign_gives_a_hint(tmp_path):
     with pytest.raises(UserError, match=r"no column 'vir,q'.*several are given as ours=theirs,ours=theirs"):
         columns(tmp_path, "t,vir,qm\n0,1,2\n1,2,3\n").has("vir,q", "u")
 
@@ -281,7 +281,7 @@ U, TUX = "--map t=time,u=u,x=x", "--map t=TIME,u=CH1,x=CH2 --unit x=m"
         case("map_comma/commahead.csv", "--map t=time --map 'u=Torque, Request' --map x=pos", x=(0.0, 1.7098e-5)),
     ],
 )
-def test_recordings_that_failed(tmp_path, file, options, rows, rate, x):
+def test_formerly_failing_recordings_are_read(tmp_path, file, options, rows, rate, x):
     assert (
         main(["import", str(FAILING / file), "--plant", "axis", *shlex.split(options), "-o", str(tmp_path / "b")]) == 0
     )
@@ -302,7 +302,7 @@ def test_recordings_that_failed(tmp_path, file, options, rows, rate, x):
         ("csv_units_row/rigol.csv", "--map t=X,u=CH1,x=CH2", r"column 'X' \(t\) is a number without unit.*--unit t="),
     ],
 )
-def test_recordings_that_are_refused(tmp_path, capsys, file, options, words):
+def test_unsuitable_recordings_are_refused(tmp_path, capsys, file, options, words):
     assert (
         main(["import", str(FAILING / file), "--plant", "axis", *shlex.split(options), "-o", str(tmp_path / "b")]) == 2
     )
@@ -325,7 +325,7 @@ def test_recordings_that_are_refused(tmp_path, capsys, file, options, words):
         ("mat_struct_array/cell.mat", "--map t=data.1,u=data.2,x=data.3", 600, "600 rows at 1000"),
     ],
 )  # fmt: skip
-def test_other_files_that_failed(tmp_path, capsys, file, options, rows, said):
+def test_formerly_failing_files_of_other_formats_are_read(tmp_path, capsys, file, options, rows, said):
     assert (
         main(["import", str(FAILING / file), "--plant", "axis", *shlex.split(options), "-o", str(tmp_path / "b")]) == 0
     )

@@ -1,4 +1,4 @@
-"""SIGKILL at any moment of a recording costs no more than the batch that was being written."""
+"""SIGKILL during a recording loses at most the batch that was being written."""
 
 import json
 import multiprocessing
@@ -22,22 +22,22 @@ from rtctl.trace.bundle import load_bundle
 from rtctl.trace.repair import repair
 from rtctl.trace.rotation import Rotation
 
-KILLS, TOTAL, SIZE = 20, 4000, 50  # a batch of 50 rows is what 10 kHz gives in 5 ms
-SMALL = Rotation(megabytes=TOTAL * ROW.itemsize / 1e6 / 6)  # some six parts
+KILLS, TOTAL, SIZE = 20, 4000, 50  # 50 rows: 5 ms at 10 kHz
+SMALL = Rotation(megabytes=TOTAL * ROW.itemsize / 1e6 / 6)  # about six parts
 
 
 @pytest.fixture(scope="module")
 def processes():
-    """Processes that start at once, from one that has imported the recorder."""
+    """Context of a fork server with the recorder imported, for fast process starts."""
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(["rtctl.trace.recorder"])
     return context
 
 
 def killed_at(processes, folder: Path, moment: int, rotation: Rotation | None) -> tuple[int, bool]:
-    """Record into `folder` and kill at the first announcement of `moment` rows or more, or while it finishes.
+    """Record into `folder`; kill at the first announcement of at least `moment` rows, or during the finish.
 
-    Returns the last announcement before death, and whether it was finishing.
+    Returns the last announced number of rows, and whether the recorder was finishing.
     """
     ours, theirs = processes.Pipe(duplex=False)
     child = processes.Process(target=feed, args=(theirs, folder, TOTAL, SIZE, rotation))
@@ -52,19 +52,19 @@ def killed_at(processes, folder: Path, moment: int, rotation: Rotation | None) -
             if not killed and (finishing or given >= moment):
                 child.kill()
                 killed = True
-    except EOFError:  # all that it ever said has been read
+    except EOFError:  # all announcements are read
         pass
     child.join()
     assert child.exitcode == -signal.SIGKILL or finishing
     return given, finishing
 
 
-def test_kills_lose_no_more_than_the_batch_in_hand(tmp_path, processes):
+def test_kill_loses_at_most_the_batch_being_written(tmp_path, processes):
     draw = random.Random(5)
     finished = 0
     for number in range(KILLS):
         folder, rotation = tmp_path / str(number), SMALL if number % 2 else None
-        moment = draw.randrange(1, TOTAL + TOTAL // 5)  # a sixth of them while it finishes
+        moment = draw.randrange(1, TOTAL + TOTAL // 5)  # a sixth of the kills during the finish
         given, finishing = killed_at(processes, folder, moment, rotation)
         finished += finishing
         try:
@@ -92,11 +92,11 @@ def tell(supervisor):
         os.read(0, 1)  # until it is killed: the recorder goes on, but the run never comes to its end
 Session(config, Path(order["out"]), order["seconds"]).run(tell)
 """
-SECONDS = 4000.0  # more than is recorded by whoever comes late to kill
+SECONDS = 4000.0  # s, more than is recorded before a late kill
 
 
 @pytest.mark.parametrize("share", [0.01, 0.06])
-def test_a_killed_supervisor_leaves_a_prefix_of_the_run(
+def test_killed_supervisor_leaves_a_prefix_of_the_run(
     runtime: Path, config: Callable[..., Any], tmp_path: Path, share: float
 ) -> None:
     settings = config(set={"record.seconds": 2.0, "record.batch": 0.001})  # a ring of 1000 rows: many batches
@@ -111,7 +111,7 @@ def test_a_killed_supervisor_leaves_a_prefix_of_the_run(
     assert child.stdout is not None
     written = 0
     try:
-        while word := child.stdout.read(8):  # to the end of what it said, also after its death
+        while word := child.stdout.read(8):  # read the whole output, also after its end
             written = int.from_bytes(word, "little")
             if written >= enough and child.poll() is None:
                 child.kill()
@@ -124,6 +124,6 @@ def test_a_killed_supervisor_leaves_a_prefix_of_the_run(
     assert enough <= written <= rows < SECONDS * 500
     truth = fused.run(settings, rows / 500).rows
     columns = load_bundle(tmp_path / "run").columns
-    columns.pop("order", None)  # of the request to arm: the run within this process has it without a mailbox
+    columns.pop("order", None)  # the fused run arms without a mailbox order
     for name, found in columns.items():
         np.testing.assert_array_equal(found, truth[name][:rows], err_msg=name)

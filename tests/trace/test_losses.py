@@ -6,7 +6,7 @@ from rtctl.trace.losses import MOST_GAPS, Losses
 
 
 @given(st.sets(st.integers(0, 200)), st.integers(1, 5))
-def test_gaps_are_just_the_ticks_that_were_lost(ticks, parts):
+def test_gaps_are_exactly_the_lost_ticks(ticks, parts):
     losses = Losses()
     for part in np.array_split(np.array(sorted(ticks), dtype=int), parts):
         losses.add_ticks(part)
@@ -15,7 +15,7 @@ def test_gaps_are_just_the_ticks_that_were_lost(ticks, parts):
     assert all(a + n < b for (a, n), (b, _) in zip(losses.gaps, losses.gaps[1:], strict=False))
 
 
-def test_gaps_told_out_of_order_are_joined():
+def test_gaps_reported_out_of_order_are_joined():
     losses = Losses()
     losses.add(20, 5)
     losses.add(10, 10)
@@ -23,7 +23,7 @@ def test_gaps_told_out_of_order_are_joined():
     assert losses.as_dict() == {"rows": 15, "gaps": [[10, 15]]}
 
 
-def test_the_list_is_bounded_but_the_count_is_exact():
+def test_list_of_gaps_is_bounded_but_the_count_is_exact():
     losses = Losses()
     for k in range(MOST_GAPS + 3):
         losses.add(10 * k, 2)

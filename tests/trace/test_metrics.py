@@ -18,7 +18,7 @@ def clock(ref: np.ndarray) -> np.ndarray:
     return np.arange(len(ref)) * DT
 
 
-def test_a_first_order_response_has_the_known_metrics():
+def test_first_order_response_has_the_analytic_metrics():
     ref = held(0.0, 2.0, each=1000)
     t = clock(ref)
     tau = 0.1
@@ -33,7 +33,7 @@ def test_a_first_order_response_has_the_known_metrics():
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize("zeta", [0.3, 0.6])
-def test_overshoot_is_that_of_the_damping(sign, zeta):
+def test_overshoot_agrees_with_the_damping(sign, zeta):
     ref = sign * held(1.0, 3.0, each=2000)
     t = clock(ref)
     wn, s = 20.0, np.maximum(t - t[2000], 0)
@@ -43,7 +43,7 @@ def test_overshoot_is_that_of_the_damping(sign, zeta):
     assert step["overshoot_pct"] == pytest.approx(100 * np.exp(-np.pi * zeta / np.sqrt(1 - zeta**2)), rel=1e-3)
 
 
-def test_final_error_keeps_its_sign_and_looks_at_the_last_tenth_only():
+def test_final_error_is_the_signed_mean_of_the_last_tenth():
     ref = held(0.0, 1.0, -1.0)
     y = ref.copy()
     y[500:940] -= 0.5
@@ -55,7 +55,7 @@ def test_final_error_keeps_its_sign_and_looks_at_the_last_tenth_only():
     assert up["settling_s"] == pytest.approx(440 * DT)
 
 
-def test_a_step_that_does_not_settle_says_none():
+def test_settling_time_of_an_unsettled_step_is_none():
     ref = held(0.0, 1.0)
     y = ref - 0.03
     assert step_metrics(clock(ref), ref, y, 1.0)[0]["settling_s"] is None
@@ -66,7 +66,7 @@ def test_a_step_that_does_not_settle_says_none():
 
 
 @pytest.mark.parametrize("length", [2, 7, 60])
-def test_a_ramp_is_one_step_at_its_end(length):
+def test_ramp_is_one_step_at_its_end(length):
     ramp = np.linspace(0.0, 0.1, length + 1)[1:]
     ref = np.concatenate([np.zeros(100), ramp, np.full(200, 0.1), np.full(200, 0.3)])
     t = clock(ref)
@@ -82,12 +82,12 @@ def test_a_ramp_is_one_step_at_its_end(length):
         np.sin(np.linspace(0, 30, 5000)),
         np.array([]),
         np.array([1.0]),
-        np.concatenate([np.zeros(50), [1.0], np.zeros(50)]),  # there and back
-        np.concatenate([np.zeros(50), np.linspace(0, 1, 50)]),  # still on its way at the end
+        np.concatenate([np.zeros(50), [1.0], np.zeros(50)]),  # a pulse of one sample
+        np.concatenate([np.zeros(50), np.linspace(0, 1, 50)]),  # a ramp that does not end
         0.1 + 1e-17 * np.arange(100),
     ],
 )
-def test_a_reference_without_steps_has_no_metrics(ref):
+def test_reference_without_steps_has_no_metrics(ref):
     assert step_metrics(clock(ref), ref, ref, 1.0) == []
 
 
@@ -111,7 +111,7 @@ def test_every_step_is_found_with_its_size_and_error(holds, error):
         assert step["overshoot_pct"] == pytest.approx(max(0.0, -error / step["size"]) * 100, abs=1e-9)
 
 
-def test_both_units_are_filled_on_both_machines():
+def test_final_error_is_in_radians_and_millimetres_on_both_machines():
     ref = held(0.0, 1.0)
     ivu = scales({"plant": "ivu", "parameters": {"R_c": 0.0125}})
     ldu = scales({"plant": "ldu", "parameters": {"R_c": 0.0125}})
@@ -125,13 +125,13 @@ def test_both_units_are_filled_on_both_machines():
         scales({"plant": "ivu"})
 
 
-def test_the_error_of_a_rotary_axis_is_an_angle():
+def test_error_of_a_rotary_axis_is_an_angle():
     ref = held(0.0, 1.0)
     (step,) = step_metrics(clock(ref), ref, ref - 0.01, *scales({"plant": "axis", "sensors": {"unit": "rad"}}))
     assert step["final_error_mm"] is None and step["final_error_rad"] == pytest.approx(0.01)
     assert final_error_unit([step]) == "rad" and summary([step]).startswith("1 step   |   largest final error 0.01 rad")
 
 
-def test_refuses_columns_of_different_length():
+def test_columns_of_different_length_are_refused():
     with pytest.raises(ValueError, match="equally long"):
         step_metrics(np.zeros(3), np.zeros(3), np.zeros(2), 1.0)

@@ -1,4 +1,4 @@
-"""Folders that are renamed or deleted while they are recorded into: noticed, told, and no row is lost in silence."""
+"""Folders renamed or deleted during a recording: detected, reported, and every lost row counted."""
 
 import os
 import shutil
@@ -44,7 +44,7 @@ def until(what: Callable[[], Any]) -> None:
         time.sleep(0.001)
 
 
-def test_a_renamed_folder_is_followed(tmp_path: Path) -> None:
+def test_recording_follows_a_renamed_folder(tmp_path: Path) -> None:
     run = record(tmp_path / "run")
     (tmp_path / "run").rename(tmp_path / "other")
     put(run, 60, 90)
@@ -56,27 +56,27 @@ def test_a_renamed_folder_is_followed(tmp_path: Path) -> None:
     assert found.case["recording_moved"] == [error] and found.case["complete"] is True
 
 
-def test_the_rows_of_a_deleted_folder_are_rescued(tmp_path: Path) -> None:
-    (tmp_path / "run-rescued").mkdir()  # of a run before
+def test_rows_of_a_deleted_folder_are_rescued(tmp_path: Path) -> None:
+    (tmp_path / "run-rescued").mkdir()  # folder of an earlier run
     run = record(tmp_path / "run")
     shutil.rmtree(tmp_path / "run")
     put(run, 60, 90)
     assert "was deleted while it was recorded: its rows are rescued into" in str(run.trouble)
     rescued = tmp_path / "run-rescued-2"
-    assert (rescued / "recording.arrows").exists()  # at once: a process that is killed now leaves them for `repair`
+    assert (rescued / "recording.arrows").exists()  # written at once: `repair` finds the rows after a kill
     put(run, 90, 100)
     assert run.finish() == rescued and is_truth(load_bundle(rescued).columns, range(100))
     assert list((tmp_path / "run-rescued").iterdir()) == []
 
 
-def test_a_folder_that_is_deleted_at_the_end_is_noticed(tmp_path: Path) -> None:
+def test_folder_deleted_at_the_end_is_detected(tmp_path: Path) -> None:
     run = record(tmp_path / "run")
     shutil.rmtree(tmp_path / "run")
     assert is_truth(load_bundle(run.finish()).columns, range(60)) and run.trouble
 
 
 @pytest.mark.parametrize("how", ["file", "another"])
-def test_a_stream_that_is_deleted_alone_or_replaced_is_rescued(tmp_path: Path, how: str) -> None:
+def test_deleted_or_replaced_stream_file_is_rescued(tmp_path: Path, how: str) -> None:
     run = record(tmp_path / "run")
     (tmp_path / "run" / "recording.arrows").unlink()
     if how == "another":
@@ -87,7 +87,7 @@ def test_a_stream_that_is_deleted_alone_or_replaced_is_rescued(tmp_path: Path, h
     assert how == "file" or (tmp_path / "run" / "recording.arrows").read_text() == "mine"
 
 
-def test_parts_of_a_renamed_folder_are_followed(tmp_path: Path) -> None:
+def test_recording_follows_the_parts_of_a_renamed_folder(tmp_path: Path) -> None:
     run = record(tmp_path / "run", PARTS)
     (tmp_path / "run").rename(tmp_path / "other")
     for first in range(60, 200, 35):
@@ -99,7 +99,7 @@ def test_parts_of_a_renamed_folder_are_followed(tmp_path: Path) -> None:
     assert "was renamed" in found.case["recording_moved"][0]
 
 
-def test_parts_that_are_deleted_are_counted_and_the_open_one_is_rescued(tmp_path: Path) -> None:
+def test_deleted_parts_are_counted_and_the_open_part_is_rescued(tmp_path: Path) -> None:
     run = record(tmp_path / "run", PARTS)
     until((tmp_path / "run" / "part-0001" / "recording.parquet").exists)
     until(lambda: not (tmp_path / "run" / "part-0001" / "recording.arrows").exists())
@@ -115,7 +115,7 @@ def test_parts_that_are_deleted_are_counted_and_the_open_one_is_rescued(tmp_path
     assert repair(rescued).changed is False
 
 
-def test_a_part_that_is_deleted_alone_comes_back(tmp_path: Path) -> None:
+def test_single_deleted_part_is_restored(tmp_path: Path) -> None:
     run = record(tmp_path / "run", PARTS)
     shutil.rmtree(tmp_path / "run" / "part-0002")
     put(run, 60, 130)
@@ -123,7 +123,7 @@ def test_a_part_that_is_deleted_alone_comes_back(tmp_path: Path) -> None:
     assert run.finish() == tmp_path / "run" and is_truth(load_bundle(tmp_path / "run").columns, range(130))
 
 
-def test_a_disk_without_room_for_the_rescue_is_told_and_tried_again_at_the_end(
+def test_rescue_without_disk_space_is_reported_and_retried_at_the_end(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     run = record(tmp_path / "run")
@@ -144,7 +144,7 @@ def test_a_disk_without_room_for_the_rescue_is_told_and_tried_again_at_the_end(
     assert is_truth(found.columns, range(60)) and found.case["losses"] == {"rows": 30, "gaps": [[60, 30]]}
 
 
-def test_the_journal_comes_along(tmp_path: Path) -> None:
+def test_journal_follows_the_rescued_folder(tmp_path: Path) -> None:
     command = np.zeros(1, [("order", "i8"), ("arm", "i8")])[0]
     journal = Journal()
     for name in ("run", "rescued"):
@@ -161,7 +161,7 @@ def test_the_journal_comes_along(tmp_path: Path) -> None:
     assert list(orders(tmp_path / "rescued")) == [1, 2]
 
 
-def test_a_pipe_is_in_its_place_always(tmp_path: Path) -> None:
+def test_pipe_always_counts_as_in_place(tmp_path: Path) -> None:
     ends = os.pipe()
     assert moved.in_place(ends[0], tmp_path / "nowhere")
     for end in ends:

@@ -1,4 +1,4 @@
-"""A bundle as a data scientist meets it."""
+"""A bundle in a notebook: columns, tables, figures."""
 
 import sys
 from dataclasses import replace
@@ -24,24 +24,24 @@ def bundle(tmp_path):
     return load_bundle(tmp_path)
 
 
-def test_a_column_has_its_name(bundle):
+def test_bundle_column_is_found_by_name(bundle):
     np.testing.assert_array_equal(bundle["u1"], bundle.columns["u1"])
     with pytest.raises(UserError, match=r"has no column 'u11'; did you mean 'u1'\?"):
         bundle["u11"]
 
 
-def test_it_has_rows_and_names(bundle):
+def test_bundle_has_rows_and_names(bundle):
     assert len(bundle) == ROWS
     assert list(bundle) == list(bundle.columns)
 
 
-def test_it_tells_itself_in_a_line(bundle):
+def test_bundle_repr_is_one_short_line(bundle):
     assert repr(bundle).startswith(f"<Bundle {bundle.folder}: ")
     assert f"{ROWS} rows" in repr(bundle)
     assert len(repr(bundle)) < 200 + len(str(bundle.folder))
 
 
-def test_its_table_has_units_and_escapes_names(bundle):
+def test_html_table_has_units_and_escaped_names(bundle):
     page = bundle._repr_html_()
     assert "<th>u1</th><td>V</td>" in page
     odd = replace(bundle, columns={**bundle.columns, "<b>": np.full(ROWS, np.nan)})
@@ -49,20 +49,20 @@ def test_its_table_has_units_and_escapes_names(bundle):
     assert "no number" in odd._repr_html_()
 
 
-def test_arrow_reads_it_without_a_word_of_ours(bundle):
+def test_arrow_reads_a_bundle_directly(bundle):
     table = pa.table(bundle)
     assert table.num_rows == ROWS
     assert table.field("u1").metadata == {b"unit": b"V"}
     np.testing.assert_array_equal(table.column("u1").to_numpy(), bundle["u1"])
 
 
-def test_duckdb_reads_it(bundle):
+def test_duckdb_reads_a_bundle(bundle):
     duckdb = pytest.importorskip("duckdb")
     recording = pa.table(bundle)  # noqa: F841  duckdb finds it by its name
     assert duckdb.sql("select count(*) from recording").fetchall() == [(ROWS,)]
 
 
-def test_pandas(bundle):
+def test_bundle_to_pandas(bundle):
     pytest.importorskip("pandas")
     frame = bundle.to_pandas()
     assert frame.index.name == "t"
@@ -70,8 +70,8 @@ def test_pandas(bundle):
     np.testing.assert_array_equal(frame["u1"], bundle["u1"])
 
 
-def test_xarray(bundle, monkeypatch):
-    """What a Dataset is made of; the library itself is not part of the development environment."""
+def test_bundle_to_xarray(bundle, monkeypatch):
+    """Arguments of an xarray Dataset; xarray is stubbed, since the development environment lacks it."""
     there = ModuleType("xarray")
     there.Dataset = lambda values, coords, attrs: (values, coords, attrs)
     monkeypatch.setitem(sys.modules, "xarray", there)
@@ -84,13 +84,13 @@ def test_xarray(bundle, monkeypatch):
     assert attrs == {"folder": str(bundle.folder)}
 
 
-def test_a_library_that_is_missing_is_named_with_its_extra(bundle, monkeypatch):
+def test_missing_library_error_names_the_extra(bundle, monkeypatch):
     monkeypatch.setitem(sys.modules, "xarray", None)
     with pytest.raises(UserError, match=r"needs the package xarray: pip install 'rtctl\[notebook\]'"):
         bundle.to_xarray()
 
 
-def test_a_picture_of_some_columns_has_a_panel_a_unit(bundle):
+def test_figure_has_one_panel_per_unit(bundle):
     names = [name for name in bundle if bundle.units.get(name)]
     figure = bundle.plot(*names)
     assert len(figure.axes) == len({bundle.units[name] for name in names})
@@ -100,7 +100,7 @@ def test_a_picture_of_some_columns_has_a_panel_a_unit(bundle):
         bundle.plot("nothing")
 
 
-def test_a_cell_shows_a_figure_without_pyplot(tmp_path):
+def test_notebook_cell_shows_a_figure_without_pyplot(tmp_path):
     import pickle
 
     from matplotlib.figure import Figure

@@ -1,4 +1,4 @@
-"""The functions that a notebook calls beyond a bundle: diagnosis, import, export, simulation, experiments, library."""
+"""API functions for notebooks: diagnosis, import, export, simulation, experiments, effect library."""
 
 import json
 import sys
@@ -16,7 +16,7 @@ from rtctl.diagnose.evidence.diagnosis import Interval, LookAlike
 
 
 class Answer:
-    """What a diagnosis of rtctl.diagnose.answer offers to the outside."""
+    """Stub of a diagnosis of rtctl.diagnose.answer."""
 
     verdict, headline, seconds = "named", "The drive pushes <b>when</b> nothing is asked for.", 1.5
     located, experiment, heldout, cannot_test, parameters = None, None, None, ("tape.slack",), {}
@@ -29,7 +29,7 @@ class Answer:
 
 @pytest.fixture
 def answered(monkeypatch):
-    """`rtctl.diagnose` with the search replaced: what it was given, and a diagnosis."""
+    """`rtctl.diagnose` with a stubbed search; returns the list of calls."""
     from rtctl.diagnose.answer import answer
 
     given = []
@@ -43,7 +43,7 @@ def answered(monkeypatch):
     return given
 
 
-def test_a_package_is_called_as_its_function_and_stays_a_package():
+def test_callable_package_calls_its_function_and_stays_a_package():
     import rtctl.diagnose.answer.answer
     import rtctl.identify.friction
 
@@ -51,7 +51,7 @@ def test_a_package_is_called_as_its_function_and_stays_a_package():
     assert rtctl.diagnose.answer.answer.GraphDiagnosis and callable(rtctl.identify)
 
 
-def test_a_diagnosis_in_words_a_table_and_plain_data(answered, tmp_path):
+def test_diagnosis_as_text_table_and_plain_data(answered, tmp_path):
     heard = []
     found = rtctl.diagnose(tmp_path, progress=heard.append)
     assert answered == [(tmp_path,)] and heard == ["screening every hypothesis"]
@@ -66,7 +66,7 @@ def test_a_diagnosis_in_words_a_table_and_plain_data(answered, tmp_path):
     }  # fmt: skip
 
 
-def test_the_report_is_shown_in_a_cell_and_saved(answered, tmp_path, monkeypatch):
+def test_report_is_shown_in_a_cell_and_saved(answered, tmp_path, monkeypatch):
     from rtctl.diagnose.answer import report
 
     monkeypatch.setattr(report, "html", lambda found: f"<p title='a'>{found.verdict}</p>")
@@ -75,7 +75,7 @@ def test_the_report_is_shown_in_a_cell_and_saved(answered, tmp_path, monkeypatch
     assert "srcdoc='&lt;p title=&#x27;a&#x27;&gt;named&lt;/p&gt;'" in made._repr_html_()
 
 
-def test_several_recordings_are_of_one_machine_only_where_that_is_said(answered, tmp_path):
+def test_several_recordings_need_the_argument_together(answered, tmp_path):
     folders = [bundle(tmp_path / name) for name in "ab"]
     with pytest.raises(rtctl.UserError, match="several recordings are one machine"):
         rtctl.diagnose(*folders)
@@ -85,12 +85,12 @@ def test_several_recordings_are_of_one_machine_only_where_that_is_said(answered,
         rtctl.diagnose()
 
 
-def test_the_former_name_warns(answered, tmp_path):
+def test_deprecated_name_warns(answered, tmp_path):
     with pytest.warns(DeprecationWarning, match=r"rtctl.diagnose\(\) now and goes in version 0.2"):
         assert rtctl.diagnosis(tmp_path).verdict == "named"
 
 
-def test_a_bar_in_a_notebook_that_moves_and_goes(monkeypatch):
+def test_notebook_progress_bar_moves_and_is_cleared(monkeypatch):
     shown = []
     handle = types.SimpleNamespace(update=shown.append)
     display = types.SimpleNamespace(HTML=lambda text: text, display=lambda html, display_id: handle)
@@ -102,7 +102,7 @@ def test_a_bar_in_a_notebook_that_moves_and_goes(monkeypatch):
     assert shown[-1] == ""
 
 
-def test_a_script_without_a_terminal_sees_no_bar(capsys, monkeypatch):
+def test_script_without_a_terminal_shows_no_progress_bar(capsys, monkeypatch):
     monkeypatch.setattr(
         sys, "stderr", types.SimpleNamespace(isatty=lambda: False, write=lambda _: pytest.fail("a bar"))
     )
@@ -123,12 +123,12 @@ def bundle(folder, rows=200):
     return folder
 
 
-def test_import_and_export_there_and_back(tmp_path):
+def test_recording_survives_export_and_import(tmp_path):
     made = rtctl.export(
         rtctl.load_bundle(bundle(tmp_path / "a")), "mcap", tmp_path / "a.mcap", columns=("u", "x"), end=1.0
     )
     assert (made.rows, made.columns) == (101, ("t", "u", "x"))
-    with pytest.warns(UserWarning):  # the file names no unit of x
+    with pytest.warns(UserWarning):  # the file has no unit of x
         back = rtctl.import_recording(
             made.path, tmp_path / "b", plant="axis", columns={"u": "u", "x": "x"}, units={"x": "mm"},
             case={"drive": {"newton_per_volt": 35.15}},
@@ -148,20 +148,20 @@ def test_import_and_export_there_and_back(tmp_path):
         (lambda: rtctl.identify("friction"), "needs bundles, or one config"),
     ],
 )
-def test_mistakes_are_one_message(tmp_path, monkeypatch, call, words):
+def test_invalid_arguments_give_one_message(tmp_path, monkeypatch, call, words):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(rtctl.UserError, match=words):
         call()
 
 
-def test_the_library_of_effects():
+def test_physics_lists_the_library_of_effects():
     library = rtctl.physics()
     assert "drive.offset" in library and "friction.stribeck" in library._repr_html_()
     one = rtctl.physics("friction.stribeck")
     assert "F_s" in one.parameters and "friction.presliding" in one.look_alikes and one.check and one.equation
 
 
-def test_a_simulation_of_a_believed_model(tmp_path):
+def test_nominal_model_is_simulated(tmp_path):
     folder = bundle(tmp_path / "a", 600)
     case = json.loads((folder / "case.json").read_text())
     case |= {
@@ -178,5 +178,5 @@ def test_a_simulation_of_a_believed_model(tmp_path):
     assert list(pytest.importorskip("pandas") and made.to_pandas().columns) == ["x", "x_simulated"]
 
 
-def test_diagnosis_is_a_class_of_its_own():
+def test_diagnosis_has_a_public_class():
     assert api_diagnosis.Diagnosis is rtctl.Diagnosis

@@ -1,4 +1,4 @@
-"""The journal: what was told is read back as it was, and a torn line at its end costs no more than itself."""
+"""Journal of orders: bit-exact round trip, and only the torn last line is lost."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ def command(order, target=0.0):
     return record
 
 
-def test_every_order_comes_back_to_the_bit(tmp_path):
+def test_every_order_is_read_back_bit_exact(tmp_path):
     journal = Journal()
     journal.note(command(1), {})
     journal.open(tmp_path)
@@ -30,11 +30,11 @@ def test_every_order_comes_back_to_the_bit(tmp_path):
         assert back == command(number, target)
 
 
-def test_a_recording_without_a_journal_has_no_orders(tmp_path):
+def test_recording_without_a_journal_has_no_orders(tmp_path):
     assert orders(tmp_path) == {}
 
 
-def test_a_torn_last_line_is_left_out_and_any_other_is_named(tmp_path):
+def test_torn_last_line_is_skipped_and_any_other_damage_is_an_error(tmp_path):
     journal = Journal()
     journal.open(tmp_path)
     journal.note(command(1), {})
@@ -49,7 +49,7 @@ def test_a_torn_last_line_is_left_out_and_any_other_is_named(tmp_path):
         orders(tmp_path)
 
 
-def test_a_full_disk_costs_the_journal_and_not_the_run(tmp_path):
+def test_full_disk_ends_the_journal_but_not_the_run(tmp_path):
     journal = Journal()
     journal.open(tmp_path)
     journal._file.close()

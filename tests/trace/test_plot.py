@@ -21,7 +21,7 @@ def columns(names, rows=300):
 
 @pytest.fixture
 def drawn(monkeypatch):
-    """The figures that were saved, to ask what is on them."""
+    """List of the saved figures."""
     figures, save = [], plot.Figure.savefig
 
     def keep(figure, *to, **options):
@@ -43,7 +43,7 @@ def drawn(monkeypatch):
         (("u",), ["output [V]"]),
     ],
 )
-def test_shows_what_is_there_with_its_unit(tmp_path, drawn, names, labels):
+def test_plot_shows_every_column_with_its_unit(tmp_path, drawn, names, labels):
     path = plot_run(columns(names), [], tmp_path / "a.png")
     assert imread(path).shape[1] == 1430
     assert [axes.get_ylabel() for axes in drawn[0].axes] == labels
@@ -62,7 +62,7 @@ def test_title_metrics_and_unit_come_from_the_bundle(tmp_path, drawn):
     assert drawn[0].axes[0].get_title(loc="left").startswith("2 steps   |   largest final error 0.125 mm")
 
 
-def test_small_values_get_a_prefix(tmp_path, drawn):
+def test_small_values_get_an_si_prefix(tmp_path, drawn):
     run = columns(("error", "u"))
     run["error"] = run["error"] * 2e-4
     plot_run(run, [], tmp_path / "a.png")
@@ -70,13 +70,13 @@ def test_small_values_get_a_prefix(tmp_path, drawn):
     assert np.abs(drawn[0].axes[0].lines[0].get_ydata()).max() == pytest.approx(200, rel=1e-3)
 
 
-def test_the_summary_names_the_worst_with_its_sign():
+def test_summary_names_the_largest_error_with_its_sign():
     step = {"final_error_mm": 0.1, "overshoot_pct": 3.0, "settling_s": 0.2}
     text = summary([step, {**step, "final_error_mm": -0.2, "settling_s": None}])
     assert "-0.2 mm" in text and "slowest settling 0.2 s" in text and "1 did not settle" in text
 
 
-def test_a_million_rows_become_a_few_thousand_points(tmp_path, drawn):
+def test_million_rows_are_reduced_to_a_few_thousand_points(tmp_path, drawn):
     n = 1_000_000
     y = np.zeros(n)
     y[123_456] = 5.0  # one sample
@@ -90,7 +90,7 @@ def test_a_million_rows_become_a_few_thousand_points(tmp_path, drawn):
     y=st.lists(st.floats(-1e6, 1e6) | st.just(float("nan")), min_size=1, max_size=300),
     buckets=st.integers(1, 60),
 )
-def test_the_envelope_covers_the_same_range_in_every_part(y, buckets):
+def test_envelope_covers_the_range_of_every_interval(y, buckets):
     y = np.array(y)
     t = np.arange(len(y), dtype=float)
     times, values = envelope(t, y, buckets)
@@ -102,26 +102,26 @@ def test_the_envelope_covers_the_same_range_in_every_part(y, buckets):
         assert np.isnan(values).all()
 
 
-def test_a_falling_line_is_not_drawn_as_a_zigzag():
+def test_falling_line_is_not_drawn_as_a_zigzag():
     t = np.linspace(0, 1, 10_000)
     _, values = envelope(t, -t, 100)
     assert (np.diff(values) <= 0).all()
 
 
-def test_survives_nan_one_row_and_constants(tmp_path, recwarn):
+def test_plot_accepts_nan_one_row_and_constants(tmp_path, recwarn):
     nothing = np.full(5, np.nan)
     plot_run({"t": np.arange(5.0), "u": nothing, "ref": np.zeros(5)}, [], tmp_path / "a.png")
     plot_run({"t": np.array([0.0]), "u": np.array([1.0])}, [], tmp_path / "b.png")
     assert [str(w.message) for w in recwarn] == []
 
 
-def test_leaves_the_global_state_of_matplotlib_alone(tmp_path):
+def test_plot_keeps_the_global_state_of_matplotlib(tmp_path):
     before = dict(matplotlib.rcParams)
     plot_run(columns(IVU), [], tmp_path / "a.png")
     assert dict(matplotlib.rcParams) == before
 
 
-def test_refuses_to_draw_nothing(tmp_path):
+def test_plot_without_a_clock_or_known_columns_is_refused(tmp_path):
     with pytest.raises(ValueError, match="no column 't'"):
         plot_run({"u": np.zeros(3)}, [], tmp_path / "a.png")
     with pytest.raises(ValueError, match="none of the columns t, z is known"):

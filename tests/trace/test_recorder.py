@@ -16,7 +16,7 @@ from rtctl.trace.stream import StreamWriter
 
 @pytest.fixture
 def slow_disk(monkeypatch):
-    """Every write waits until the event is set; `began` tells that one waits."""
+    """Every write waits until the event is set; `began` is set when a write waits."""
     go, began, write = threading.Event(), threading.Event(), StreamWriter.write
 
     def wait(self, rows):
@@ -34,7 +34,7 @@ def recorder(folder, rows_queued=1_000_000, case=CASE):
     return Recorder(folder, COLUMNS, ROW, case, max_queued_bytes=rows_queued * ROW.itemsize)
 
 
-def test_a_recording_becomes_a_bundle(tmp_path):
+def test_recording_becomes_a_bundle(tmp_path):
     run = recorder(tmp_path / "new" / "run")
     assert json.loads((tmp_path / "new/run/case.json").read_text())["complete"] is False
     for first in range(0, 5000, 100):
@@ -50,7 +50,7 @@ def test_a_recording_becomes_a_bundle(tmp_path):
     assert sorted(p.name for p in folder.iterdir()) == ["case.json", "recording.parquet"]
 
 
-def test_a_slow_disk_never_blocks_and_losses_are_exact(tmp_path, slow_disk):
+def test_slow_disk_never_blocks_and_losses_are_exact(tmp_path, slow_disk):
     run = recorder(tmp_path, rows_queued=25)
     assert run.put(make(0, 10)) == 0
     assert slow_disk.began.wait(60)
@@ -91,7 +91,7 @@ def test_every_row_is_either_in_the_bundle_or_in_the_losses(tmp_path_factory, st
         assert is_truth(load_bundle(folder).columns, kept)
 
 
-def test_a_full_disk_counts_the_rest_as_lost_and_keeps_the_beginning(tmp_path, small_disk, slow_disk):
+def test_full_disk_keeps_the_written_rows_and_counts_the_rest_as_lost(tmp_path, small_disk, slow_disk):
     run = recorder(tmp_path)
     run.put(make(0, 100))
     with small_disk(6000):
@@ -107,7 +107,7 @@ def test_a_full_disk_counts_the_rest_as_lost_and_keeps_the_beginning(tmp_path, s
     assert "File too large" in run.stats().error
 
 
-def test_no_room_for_the_parquet_keeps_the_stream_and_the_losses(tmp_path, small_disk):
+def test_stream_and_losses_are_kept_without_space_for_the_parquet(tmp_path, small_disk):
     run = recorder(tmp_path, case={"format": 1})
     run.put(make(0, 20_000))
     run.note_lost(20_000, 3)
@@ -123,7 +123,7 @@ def test_no_room_for_the_parquet_keeps_the_stream_and_the_losses(tmp_path, small
     assert found.case["losses"] == told["losses"] and found.case["repaired"] is True
 
 
-def test_a_bug_in_the_writer_is_not_silent(tmp_path, monkeypatch):
+def test_exception_in_the_writer_is_reported(tmp_path, monkeypatch):
     def broken(self, rows):
         raise KeyError("no such thing")
 
@@ -134,20 +134,20 @@ def test_a_bug_in_the_writer_is_not_silent(tmp_path, monkeypatch):
     assert case["losses"]["rows"] == 10 and "no such thing" in case["recording_error"]
 
 
-def test_refuses_a_folder_that_holds_a_recording(tmp_path):
+def test_folder_with_a_recording_is_refused(tmp_path):
     recorder(tmp_path).finish()
     with pytest.raises(UserError, match=r"already holds recording\.parquet"):
         recorder(tmp_path)
 
 
-def test_a_finished_recorder_takes_no_rows(tmp_path):
+def test_finished_recorder_accepts_no_rows(tmp_path):
     run = recorder(tmp_path)
     run.finish()
     with pytest.raises(RuntimeError, match="finished"):
         run.put(make(0, 1))
 
 
-def test_the_counts_are_consistent_at_every_moment(tmp_path):
+def test_counts_are_consistent_at_every_moment(tmp_path):
     run = recorder(tmp_path, rows_queued=300)
     done, seen = threading.Event(), []
 
@@ -163,7 +163,7 @@ def test_the_counts_are_consistent_at_every_moment(tmp_path):
     done.set()
     watcher.join()
     folder = run.finish()
-    assert all(rows % 50 == 0 for rows in seen) and seen == sorted(seen)  # never a row counted twice or not at all
+    assert all(rows % 50 == 0 for rows in seen) and seen == sorted(seen)  # every row is counted exactly once
     stats = run.stats()
     assert stats.rows_written + stats.rows_lost == 20_000
     assert len(load_bundle(folder).columns["t"]) == stats.rows_written

@@ -24,7 +24,7 @@ SIZES = [1, 40, 7, 300, 2]
 
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory):
-    """The bytes of a whole stream, where its schema ends, and where each batch ends."""
+    """Bytes of a complete stream, offset of the end of its schema, offsets of the ends of its batches."""
     path = tmp_path_factory.mktemp("whole") / "recording.arrows"
     writer = StreamWriter(path, COLUMNS, ROW, {"case": json.dumps(CASE)})
     head, ends = writer.bytes, []
@@ -67,7 +67,7 @@ def check_cut(folder: Path, recording, cut: int) -> None:
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
 
 
-def test_a_cut_at_or_beside_any_boundary_gives_all_whole_batches(tmp_path, recording):
+def test_cut_at_or_near_any_boundary_gives_all_complete_batches(tmp_path, recording):
     stream, head, ends = recording
     near = {end + by for end in [0, head, *ends, len(stream)] for by in (-9, -8, -1, 0, 1, 3, 4, 7, 8, 9)}
     for cut in sorted(c for c in near if 0 <= c <= len(stream)):
@@ -76,27 +76,27 @@ def test_a_cut_at_or_beside_any_boundary_gives_all_whole_batches(tmp_path, recor
 
 @settings(deadline=None, max_examples=40)
 @given(share=st.floats(0, 1))
-def test_a_cut_anywhere_gives_a_prefix(tmp_path_factory, recording, share):
+def test_stream_cut_anywhere_gives_a_prefix(tmp_path_factory, recording, share):
     check_cut(tmp_path_factory.mktemp("cut"), recording, round(share * len(recording[0])))
 
 
-def test_zeros_after_the_last_batch_are_no_rows(tmp_path, recording):
+def test_zeros_after_the_last_batch_are_not_rows(tmp_path, recording):
     stream, _, ends = recording
     folder = killed(tmp_path / "run", stream[: ends[2]] + bytes(4096))
     assert repair(folder)[1:3] == (sum(SIZES[:3]), 4096)
     assert is_truth(load_bundle(folder).columns, range(sum(SIZES[:3])))
 
 
-def test_a_message_that_claims_more_rows_than_it_holds_is_not_whole(tmp_path, recording):
+def test_message_that_declares_more_rows_than_it_holds_is_incomplete(tmp_path, recording):
     stream, _, ends = recording
-    begin = ends[2]  # of the message of 300 rows; its length stands in its header
+    begin = ends[2]  # message of 300 rows; its header contains its length
     where = stream.index((300).to_bytes(8, "little"), begin)
     folder = killed(tmp_path / "run", stream[:where] + (3000).to_bytes(8, "little") + stream[where + 8 :])
     assert repair(folder).rows == sum(SIZES[:3])
     assert is_truth(load_bundle(folder).columns, range(sum(SIZES[:3])))
 
 
-def test_column_names_that_are_no_text(tmp_path, recording):
+def test_column_names_that_are_not_text_are_refused(tmp_path, recording):
     stream, head, _ = recording
     folder = killed(
         tmp_path / "run", stream[:head].replace(b"\x05\0\0\0state", b"\x05\0\0\0\xff\xfeate") + stream[head:]
@@ -105,7 +105,7 @@ def test_column_names_that_are_no_text(tmp_path, recording):
         repair(folder)
 
 
-def test_a_case_that_json_cannot_hold_is_told(tmp_path, recording):
+def test_case_that_is_not_valid_json_is_reported(tmp_path, recording):
     folder = killed(tmp_path / "run", recording[0], b'{"format": 1, "sample_rate": NaN}')
     with pytest.raises(UserError, match="holds NaN or Infinity"):
         repair(folder)
@@ -113,14 +113,14 @@ def test_a_case_that_json_cannot_hold_is_told(tmp_path, recording):
 
 
 @pytest.mark.parametrize("losses", [[], {"rows": "many"}, {"rows": None, "gaps": 7}])
-def test_losses_that_make_no_sense_are_counted_again(tmp_path, recording, losses):
+def test_inconsistent_losses_are_counted_again(tmp_path, recording, losses):
     folder = killed(tmp_path / "run", recording[0], json.dumps({**CASE, "losses": losses}).encode())
     repair(folder)
     assert load_bundle(folder).case["losses"] == {"rows": 0, "gaps": []}
 
 
 @pytest.mark.parametrize("case", [None, b"", b'{"format": 1, "pla', b"[]"])
-def test_a_lost_case_comes_out_of_the_recording(tmp_path, recording, case):
+def test_lost_case_is_restored_from_the_stream(tmp_path, recording, case):
     folder = killed(tmp_path / "run", recording[0], case)
     report = repair(folder)
     assert "made again from the copy inside the recording" in str(report)
@@ -131,7 +131,7 @@ def test_a_lost_case_comes_out_of_the_recording(tmp_path, recording, case):
     assert repair(folder).changed is False
 
 
-def test_a_case_lost_after_the_end_is_made_again(tmp_path, recording):
+def test_case_lost_after_the_end_is_restored(tmp_path, recording):
     folder = killed(tmp_path / "run", recording[0])
     repair(folder)
     (folder / "case.json").unlink()
@@ -139,7 +139,7 @@ def test_a_case_lost_after_the_end_is_made_again(tmp_path, recording):
     assert report.changed and load_bundle(folder).case["plant"] == "ivu"
 
 
-def test_a_recording_without_any_case_says_what_to_fill_in(tmp_path):
+def test_recording_without_a_case_lists_the_fields_to_fill_in(tmp_path):
     writer = StreamWriter(tmp_path / "recording.arrows", COLUMNS, ROW)
     writer.write(make(0, 10))
     writer.close()
@@ -147,7 +147,7 @@ def test_a_recording_without_any_case_says_what_to_fill_in(tmp_path):
     assert load_bundle(tmp_path).case["rows"] == 10
 
 
-def test_missing_ticks_are_told_as_losses(tmp_path):
+def test_missing_ticks_are_reported_as_losses(tmp_path):
     writer = StreamWriter(tmp_path / "recording.arrows", COLUMNS, ROW)
     rows = make(0, 100)
     writer.write(np.concatenate([rows[5:20], rows[23:30]]))
@@ -158,19 +158,19 @@ def test_missing_ticks_are_told_as_losses(tmp_path):
     assert load_bundle(tmp_path).case["losses"] == {"rows": 13, "gaps": [[20, 3], [30, 10]]}
 
 
-def test_a_recording_that_was_all_but_finished_keeps_its_case(tmp_path, recording):
+def test_nearly_finished_recording_keeps_its_case(tmp_path, recording):
     run = Recorder(tmp_path / "run", COLUMNS, ROW, CASE)
     run.put(make(0, sum(SIZES)))
     folder = run.finish()
     before = (folder / "case.json").read_bytes()
-    (folder / "recording.arrows").write_bytes(recording[0])  # killed just before its removal
+    (folder / "recording.arrows").write_bytes(recording[0])  # killed just before the removal of the stream
     (folder / "recording.parquet.tmp").touch()
     assert repair(folder).rows == sum(SIZES)
     assert (folder / "case.json").read_bytes() == before and load_bundle(folder).case["complete"] is True
     assert sorted(p.name for p in folder.iterdir()) == ["case.json", "recording.parquet"]
 
 
-def test_a_damaged_stream_never_replaces_a_longer_parquet(tmp_path, recording):
+def test_damaged_stream_never_replaces_a_longer_parquet(tmp_path, recording):
     folder = killed(tmp_path / "run", recording[0])
     repair(folder)
     for cut in (0, recording[2][1]):
@@ -180,7 +180,7 @@ def test_a_damaged_stream_never_replaces_a_longer_parquet(tmp_path, recording):
 
 
 @pytest.mark.parametrize("step", ["write_parquet", "save_case"])
-def test_a_repair_that_is_killed_can_be_done_again(tmp_path, recording, monkeypatch, step):
+def test_killed_repair_can_be_repeated(tmp_path, recording, monkeypatch, step):
     folder = killed(tmp_path / "run", recording[0][:-20])
     real = getattr(repair_module, step)
 
@@ -197,7 +197,7 @@ def test_a_repair_that_is_killed_can_be_done_again(tmp_path, recording, monkeypa
     assert is_truth(load_bundle(folder).columns, range(sum(SIZES[:-1])))
 
 
-def test_no_room_for_the_result_leaves_everything(tmp_path, recording, small_disk):
+def test_repair_without_disk_space_changes_nothing(tmp_path, recording, small_disk):
     folder = killed(tmp_path / "run", recording[0])
     with small_disk(1000), pytest.raises(OSError):
         repair(folder)
@@ -206,8 +206,8 @@ def test_no_room_for_the_result_leaves_everything(tmp_path, recording, small_dis
 
 
 @pytest.mark.parametrize("name", ["case.json", "recording.parquet"])
-def test_a_file_that_cannot_be_read_now_is_not_taken_for_damaged(tmp_path, recording, monkeypatch, name):
-    """A limit of open files passes; the case and the rows of the recording are whole."""
+def test_temporarily_unreadable_file_is_not_treated_as_damaged(tmp_path, recording, monkeypatch, name):
+    """The limit of open files is temporary; case and rows of the recording are intact."""
     folder = killed(tmp_path / "run", recording[0])
     repair(folder)
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
@@ -229,7 +229,7 @@ def test_a_file_that_cannot_be_read_now_is_not_taken_for_damaged(tmp_path, recor
     assert {path.name: path.read_bytes() for path in folder.iterdir() if path.name in before} == before
 
 
-def test_refuses_what_is_no_recording_or_still_runs(tmp_path):
+def test_repair_refuses_other_folders_and_running_recordings(tmp_path):
     with pytest.raises(UserError, match="nothing to repair"):
         repair(tmp_path)
     run = Recorder(tmp_path, COLUMNS, ROW, CASE)
@@ -253,7 +253,7 @@ while True:
 
 
 @pytest.mark.parametrize("size", [20_011, 1_000_003])
-def test_a_killed_recorder_is_repaired_to_what_it_had_written(tmp_path, size):
+def test_killed_recording_is_repaired_to_its_written_rows(tmp_path, size):
     folder, path = tmp_path / "run", tmp_path / "run" / "recording.arrows"
     process = subprocess.Popen([sys.executable, "-c", RECORD_FOR_EVER, folder, Path(__file__).parent])
     try:

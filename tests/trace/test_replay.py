@@ -1,4 +1,4 @@
-"""A recording through its own law: the same bits, another gain, and what cannot be replayed."""
+"""Replay of a recording through its law: bit-exact outputs, a changed gain, and refused recordings."""
 
 import json
 import shutil
@@ -22,7 +22,7 @@ TICKS = 20_000
 
 
 def record(config: Any, folder: Path, told: dict[int, list[tuple[str, dict[str, Any]]]], ticks: int) -> Path:
-    """A run in lockstep that is told something once a tick has gone by."""
+    """A run in lockstep with orders at given ticks."""
     with Supervisor(config, folder, ticks) as machine:
         waiting = sorted(told.items())
         for _ in machine.run():
@@ -54,7 +54,7 @@ def recorded(runtime: Path, config: Callable[..., Any], tmp_path_factory: pytest
 
 @pytest.fixture
 def copy(recorded: Path, tmp_path: Path) -> Iterator[Path]:
-    """One to do wrong to."""
+    """A copy of the recording for modification."""
     yield Path(shutil.copytree(recorded, tmp_path / "copy"))
     shutil.rmtree(tmp_path / "copy")
 
@@ -68,7 +68,7 @@ def change(folder: Path, column: str, row: int, value: float) -> None:
     pq.write_table(table.set_column(at, table.schema.field(at), [values]), path)
 
 
-def test_all_that_a_machine_was_told_comes_out_to_the_bit(recorded):
+def test_replay_with_all_orders_is_bit_exact(recorded):
     found = replay(recorded)
     assert found.identical and found.same_program and not found.stopped
     assert len(found.rows) == TICKS and found.written == ("u1", "u2")
@@ -77,27 +77,27 @@ def test_all_that_a_machine_was_told_comes_out_to_the_bit(recorded):
     assert found.rows["order"][-1] >= 9 and found.rows["u1"].any()
 
 
-def test_what_was_written_otherwise_is_found(copy):
+def test_changed_output_is_found(copy):
     change(copy, "u1", 1700, 0.125)
     found = replay(copy)
     (one,) = found.differences
     assert (one.column, one.tick, one.ticks, one.recorded) == ("u1", 1700, 1, 0.125)
 
 
-def test_what_was_read_otherwise_is_found_from_there_on(copy):
+def test_changed_measurement_changes_the_outputs_from_its_tick(copy):
     change(copy, "capstan_counts", 1700, 100_000.0)
     change(copy, "capstan", 1700, 10.0)
     assert replay(copy).differences[0].tick == 1700
 
 
-def test_another_gain_would_have_written_something_else(recorded):
+def test_replay_with_another_gain_gives_different_outputs(recorded):
     found = replay(recorded, {GAIN: 11.0})
     changed = {d.column for d in found.differences}
     assert {"u1", "u2", "u_c"} <= changed and not {"ref", "state"} & changed
     assert (found.rows["state"] == found.recorded["state"]).all()
 
 
-def test_behind_a_gap_nobody_knows_what_the_law_remembered(copy):
+def test_replay_stops_at_a_gap(copy):
     path = copy / "recording.parquet"
     table = pq.read_table(path)
     keep = [k for k in range(TICKS) if not 3000 <= k < 3010]
@@ -106,28 +106,28 @@ def test_behind_a_gap_nobody_knows_what_the_law_remembered(copy):
     assert found.identical and len(found.rows) == 3000 and found.stopped == "rows behind tick 2999 are missing"
 
 
-def test_a_recording_from_the_middle_has_no_answer(copy):
+def test_recording_without_its_start_cannot_be_replayed(copy):
     path = copy / "recording.parquet"
     pq.write_table(pq.read_table(path).slice(100), path)
     with pytest.raises(NoAnswer, match="begins at tick 100"):
         replay(copy)
 
 
-def test_without_the_journal_there_is_no_answer(copy):
+def test_recording_without_its_journal_cannot_be_replayed(copy):
     (copy / ORDERS).unlink()
     with pytest.raises(NoAnswer, match="is not in the journal"):
         replay(copy)
 
 
 @pytest.mark.parametrize("column", ["capstan_counts", "lateness", "order"])
-def test_a_column_that_the_law_read_must_be_there(copy, column):
+def test_replay_needs_every_column_that_the_law_reads(copy, column):
     path = copy / "recording.parquet"
     pq.write_table(pq.read_table(path).drop([column]), path)
     with pytest.raises(NoAnswer, match=f"column '{column}' is missing"):
         replay(copy)
 
 
-def test_somebody_elses_recording_has_no_law(copy):
+def test_foreign_recording_cannot_be_replayed(copy):
     path = copy / "case.json"
     case = json.loads(path.read_text())
     path.write_text(json.dumps({**case, "config": None}))
@@ -138,7 +138,7 @@ def test_somebody_elses_recording_has_no_law(copy):
         replay(copy)
 
 
-def test_the_command(recorded, copy, tmp_path, capsys):
+def test_replay_command(recorded, copy, tmp_path, capsys):
     assert main(["replay", str(recorded)]) == 0
     assert f"{TICKS} ticks" in (out := capsys.readouterr().out) and "identical to the bit" in out
     change(copy, "u1", 1700, 0.125)

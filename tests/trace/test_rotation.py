@@ -36,7 +36,7 @@ def content(folder):
     return {path.relative_to(folder): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
-def test_parts_are_read_as_one_and_each_by_itself(tmp_path):
+def test_parts_are_read_together_and_separately(tmp_path):
     folder = record(tmp_path / "run")
     parts = part_folders(folder)
     assert [part.name for part in parts] == ["part-0001", "part-0002", "part-0003", "part-0004"]
@@ -54,25 +54,25 @@ def test_parts_are_read_as_one_and_each_by_itself(tmp_path):
         assert sorted(path.name for path in part.iterdir()) == ["case.json", "recording.parquet"]
 
 
-def test_a_part_is_full_at_a_size(tmp_path):
+def test_part_ends_at_its_size_limit(tmp_path):
     folder = record(tmp_path / "run", rows=3000, size=100, rotation=Rotation(megabytes=0.02, minutes=60.0))
     found = case(folder)["parts"]
     assert sum(part["rows"] for part in found) == 3000
-    assert {part["rows"] for part in found[:-1]} == {500}  # the batch that fills a part ends it
+    assert {part["rows"] for part in found[:-1]} == {500}  # a part ends with the batch that fills it
     assert is_truth(load_bundle(folder).columns, range(3000))
 
 
-def test_no_rotation_is_a_bundle_in_one_piece(tmp_path):
+def test_recording_without_rotation_is_a_bundle_without_parts(tmp_path):
     folder = record(tmp_path / "run", rotation=Rotation())
     assert sorted(path.name for path in folder.iterdir()) == ["case.json", "recording.parquet"]
 
 
-def test_a_batch_longer_than_a_part_is_divided(tmp_path):
+def test_batch_longer_than_a_part_is_divided(tmp_path):
     folder = record(tmp_path / "run", rows=2600, size=2600)
     assert [part["rows"] for part in case(folder)["parts"]] == [500, 500, 500, 500, 500, 100]
 
 
-def test_rows_wait_for_others_to_be_written_with(tmp_path):
+def test_rows_are_written_in_batches(tmp_path):
     run = recorder(tmp_path / "run", rotation=None, batch=60.0)
     for tick in range(200):
         run.put(make(tick, 1))
@@ -81,7 +81,7 @@ def test_rows_wait_for_others_to_be_written_with(tmp_path):
         alone.put(make(tick, 1))
         while alone.stats().rows_queued:
             os.sched_yield()
-    folder = run.finish()  # does not wait for the minute to pass
+    folder = run.finish()  # finish does not wait for the batch time of a minute
     assert is_truth(load_bundle(folder).columns, range(200))
     assert run.stats().bytes_written < alone.stats().bytes_written / 8
     alone.finish()
@@ -113,7 +113,7 @@ def test_every_row_is_in_one_part_or_in_its_losses(tmp_path_factory, steps, queu
         assert is_truth(load_bundle(folder).columns, kept)
 
 
-def test_a_part_tells_what_was_changed_until_its_end(tmp_path):
+def test_case_of_a_part_lists_the_changes_until_its_end(tmp_path):
     changes = [{"tick": 10, "path": "a"}, {"tick": 999, "path": "b"}, {"tick": 1000, "path": "c"}]
     folder = record(tmp_path / "run", extra={"changes": changes, "run": {"late": 3}})
     assert case(folder)["changes"] == changes
@@ -121,10 +121,10 @@ def test_a_part_tells_what_was_changed_until_its_end(tmp_path):
     assert all(case(part)["run"] == {"late": 3} for part in part_folders(folder))
 
 
-# what goes wrong
+# failures
 
 
-def test_a_part_that_the_disk_refused_is_made_at_the_end(tmp_path, monkeypatch):
+def test_part_refused_by_the_disk_is_finished_at_the_end(tmp_path, monkeypatch):
     real, refused = Part.finish, []
 
     def finish(self, *arguments):
@@ -138,7 +138,7 @@ def test_a_part_that_the_disk_refused_is_made_at_the_end(tmp_path, monkeypatch):
     assert refused and load_bundle(folder).case["complete"] is True
 
 
-def test_parts_that_the_disk_never_takes_stay_for_repair(tmp_path, monkeypatch):
+def test_parts_refused_by_the_disk_are_left_for_repair(tmp_path, monkeypatch):
     def finish(self, *_):
         raise OSError(28, "No space left on device")
 
@@ -160,7 +160,7 @@ def test_parts_that_the_disk_never_takes_stay_for_repair(tmp_path, monkeypatch):
     assert found.case["losses"]["rows"] == 3 and found.case["run"] == {}
 
 
-def test_finish_can_be_called_again_once_there_is_room(tmp_path, monkeypatch):
+def test_finish_can_be_repeated_when_there_is_disk_space(tmp_path, monkeypatch):
     def finish(self, *_):
         raise OSError(28, "No space left on device")
 
@@ -174,7 +174,7 @@ def test_finish_can_be_called_again_once_there_is_room(tmp_path, monkeypatch):
     assert is_truth(found.columns, range(1700)) and found.case["complete"] is True
 
 
-def test_a_full_disk_counts_the_rest_as_lost(tmp_path, monkeypatch):
+def test_full_disk_counts_the_remaining_rows_as_lost(tmp_path, monkeypatch):
     real = Part.__init__
 
     def full(self, folder, *arguments):
@@ -190,7 +190,7 @@ def test_a_full_disk_counts_the_rest_as_lost(tmp_path, monkeypatch):
     assert "No space left" in found.case["recording_error"] and found.case["complete"] is False
 
 
-def test_a_recording_in_progress_is_left_alone(tmp_path):
+def test_repair_refuses_a_recording_in_progress(tmp_path):
     run = recorder(tmp_path / "run")
     run.put(make(0, 1200))
     with pytest.raises(UserError, match="in use"):
@@ -201,7 +201,7 @@ def test_a_recording_in_progress_is_left_alone(tmp_path):
     assert repair(run.folder).changed is False
 
 
-def test_a_part_that_is_gone_is_told_and_the_rest_can_be_had(tmp_path):
+def test_missing_part_is_reported_and_the_others_can_be_read(tmp_path):
     folder = record(tmp_path / "run")
     shutil.rmtree(folder / "part-0002")
     with pytest.raises(UserError, match=r"lists other parts than the folder holds .*rtctl trace repair"):
@@ -215,7 +215,7 @@ def test_a_part_that_is_gone_is_told_and_the_rest_can_be_had(tmp_path):
 
 
 @pytest.mark.parametrize("left", ["nothing", "folder", "case", "schema"])
-def test_killed_when_a_part_had_just_begun(tmp_path, left):
+def test_repair_after_a_kill_at_the_start_of_a_part(tmp_path, left):
     folder = record(tmp_path / "run", rows=1000)
     last = folder / "part-0003"
     if left != "nothing":
@@ -234,7 +234,7 @@ def test_killed_when_a_part_had_just_begun(tmp_path, left):
     assert repair(folder).changed is False and content(folder) == before
 
 
-def test_a_lost_case_on_top_is_made_again(tmp_path):
+def test_lost_case_of_the_whole_bundle_is_restored(tmp_path):
     folder = record(tmp_path / "run", extra={"changes": [{"tick": 3}]})
     for spoil in (lambda path: path.unlink(), lambda path: path.write_text("{")):
         spoil(folder / "case.json")
@@ -243,7 +243,7 @@ def test_a_lost_case_on_top_is_made_again(tmp_path):
         assert found["rows"] == 1700 and found["changes"] == [{"tick": 3}] and "part" not in found
 
 
-def test_nothing_recorded_at_all(tmp_path):
+def test_empty_recording_holds_no_rows(tmp_path):
     run = recorder(tmp_path / "run")
     assert run.finish() == tmp_path / "run"
     with pytest.raises(UserError, match="holds no rows"):
@@ -252,7 +252,7 @@ def test_nothing_recorded_at_all(tmp_path):
         repair(tmp_path / "run")
 
 
-def test_parts_of_two_recordings_are_no_bundle(tmp_path):
+def test_parts_of_two_recordings_are_refused(tmp_path):
     folder = record(tmp_path / "run")
     run = Recorder(tmp_path / "other", COLUMNS[:3], ROW, CASE)
     run.put(make(500, 500))

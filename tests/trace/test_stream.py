@@ -14,7 +14,7 @@ from rtctl.trace.stream import StreamReader, StreamWriter
 
 
 def fill(path: Path, sizes: list[int]) -> list[int]:
-    """Write batches of these sizes; returns the length of the file after each."""
+    """Write batches of the given sizes; returns the file length after each batch, bytes."""
     writer, ends = StreamWriter(path, COLUMNS, ROW, {"machine": "test"}), []
     for size in sizes:
         writer.write(make(writer.rows, size))
@@ -41,7 +41,7 @@ def test_every_batch_is_in_the_file_when_write_returns(tmp_path):
 
 @settings(deadline=None, max_examples=20)
 @given(sizes=st.lists(st.integers(0, 40), max_size=8))
-def test_reads_back_what_was_written(tmp_path_factory, sizes):
+def test_written_rows_are_read_back(tmp_path_factory, sizes):
     path = tmp_path_factory.mktemp("s") / "a.arrows"
     fill(path, sizes)
     reader = StreamReader(path)
@@ -50,7 +50,7 @@ def test_reads_back_what_was_written(tmp_path_factory, sizes):
     assert reader.bytes == path.stat().st_size
 
 
-def test_a_full_disk_is_told_once_and_what_was_written_stays(tmp_path, small_disk):
+def test_full_disk_is_reported_once_and_written_rows_are_kept(tmp_path, small_disk):
     path = tmp_path / "a.arrows"
     writer = StreamWriter(path, COLUMNS, ROW)
     writer.write(make(0, 100))
@@ -58,7 +58,7 @@ def test_a_full_disk_is_told_once_and_what_was_written_stays(tmp_path, small_dis
     with small_disk(whole + 500):
         with pytest.raises(OSError, match="File too large"):
             writer.write(make(100, 100))
-        assert writer.write(make(200, 1)) == 0  # would fit, but there is a gap now
+        assert writer.write(make(200, 1)) == 0  # fits, but would follow a gap
         writer.close()
     assert path.stat().st_size == whole
     reader = StreamReader(path)
@@ -66,7 +66,7 @@ def test_a_full_disk_is_told_once_and_what_was_written_stays(tmp_path, small_dis
     assert (writer.rows, reader.rows, reader.bytes) == (100, 100, whole)
 
 
-def test_no_room_for_the_end_mark_is_told_by_close_once(tmp_path, small_disk):
+def test_close_reports_missing_space_for_the_end_mark_once(tmp_path, small_disk):
     path = tmp_path / "a.arrows"
     writer = StreamWriter(path, COLUMNS, ROW)
     writer.write(make(0, 10))
@@ -76,19 +76,19 @@ def test_no_room_for_the_end_mark_is_told_by_close_once(tmp_path, small_disk):
     assert sum(batch.num_rows for batch in StreamReader(path)) == 10
 
 
-def test_a_device_without_room_is_refused_at_the_start():
+def test_device_without_space_is_refused_at_the_start():
     with pytest.raises(OSError, match="No space left"):
         StreamWriter(Path("/dev/full"), COLUMNS, ROW)
 
 
-def test_a_closed_stream_takes_nothing(tmp_path):
+def test_closed_stream_accepts_no_rows(tmp_path):
     writer = StreamWriter(tmp_path / "a.arrows", COLUMNS, ROW)
     writer.close()
     with pytest.raises(ValueError, match="closed"):
         writer.write(make(0, 1))
 
 
-def test_nobody_reads_or_overwrites_a_stream_that_is_being_written(tmp_path):
+def test_open_stream_is_locked_against_reading_and_overwriting(tmp_path):
     path = tmp_path / "a.arrows"
     writer = StreamWriter(path, COLUMNS, ROW)
     writer.write(make(0, 10))
@@ -115,7 +115,7 @@ for size in range(1, 1_000_000):
 
 
 @pytest.mark.parametrize("size", [1, 7_001, 400_009])
-def test_a_killed_writer_leaves_a_prefix(tmp_path, size):
+def test_killed_writer_leaves_a_prefix(tmp_path, size):
     path = tmp_path / "a.arrows"
     writer = subprocess.Popen([sys.executable, "-c", WRITE_FOR_EVER, path, Path(__file__).parent])
     try:
@@ -128,4 +128,4 @@ def test_a_killed_writer_leaves_a_prefix(tmp_path, size):
     reader = StreamReader(path)
     batches = list(reader)
     assert is_truth(pa.Table.from_batches(batches, reader.schema), range(reader.rows))
-    assert reader.bytes <= path.stat().st_size < reader.bytes + 8_000  # at most one batch is lost
+    assert reader.bytes <= path.stat().st_size < reader.bytes + 8_000  # less than one batch lost

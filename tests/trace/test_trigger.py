@@ -18,7 +18,7 @@ def rows(**columns) -> np.ndarray:
 
 
 def holds(expression: str, **values: float) -> bool:
-    """Whether the condition is true of one row, seen after a row where it is false or true."""
+    """Whether the condition holds in one row, evaluated after a row with a false or true condition."""
     trigger = Trigger(expression, NAMES)
     trigger._was = False
     return trigger(rows(**{name: [value] for name, value in values.items()})) == 0
@@ -39,23 +39,23 @@ def holds(expression: str, **values: float) -> bool:
         "tick < 1 and error < 1",
     ],
 )
-def test_means_what_python_means(expression, error):
+def test_trigger_expression_agrees_with_python(expression, error):
     with np.errstate(all="ignore"):
         expected = eval(expression, {"error": np.float64(error), "u1": np.float64(1.0), "tick": 0})
     assert holds(expression, error=error, u1=1.0) == bool(expected)
 
 
-def test_fires_where_it_turns_true_and_remembers():
+def test_trigger_fires_at_a_rising_edge_also_across_batches():
     trigger = Trigger("error > 1", NAMES)
     assert trigger(rows(error=[0, 0, 2, 2, 0])) == 2
     assert trigger(rows(error=[0, 0.5])) == -1
     assert trigger(rows(error=[2, 2])) == 0
-    assert trigger(rows(error=[2, 2])) == -1  # still true
+    assert trigger(rows(error=[2, 2])) == -1  # no edge: still true
     assert trigger(rows(error=[])) == -1
     assert trigger(rows(error=[2, 0, 0, 3])) == 3
 
 
-def test_what_is_true_from_the_start_has_not_turned_true():
+def test_condition_true_from_the_start_does_not_fire():
     trigger = Trigger("error > 1", NAMES)
     assert trigger(rows(error=[2, 2])) == -1
     assert trigger(rows(error=[2, 0, 2])) == 2
@@ -63,7 +63,7 @@ def test_what_is_true_from_the_start_has_not_turned_true():
 
 @settings(deadline=None)
 @given(st.lists(st.booleans(), max_size=40), st.lists(st.integers(0, 40), max_size=6))
-def test_batches_do_not_matter(high, cuts):
+def test_trigger_does_not_depend_on_the_batches(high, cuts):
     data = rows(error=np.array(high, dtype=float), tick=np.arange(len(high)))
     trigger, fired = Trigger("error > 0.5", NAMES), []
     for part in np.split(data, sorted(min(cut, len(high)) for cut in cuts)):
@@ -74,11 +74,11 @@ def test_batches_do_not_matter(high, cuts):
     assert fired[:1] == edges[:1] and set(fired) <= set(edges)
 
 
-def test_a_constant_condition_never_turns():
+def test_constant_condition_never_fires():
     assert Trigger("1 < 2", NAMES)(rows(error=[0, 0])) == -1
 
 
-def test_nan_is_false():
+def test_comparison_with_nan_is_false():
     trigger = Trigger("error > 1", NAMES)
     assert trigger(rows(error=[0, np.nan, 2])) == 2
 
@@ -114,7 +114,7 @@ def test_nan_is_false():
         ("error > 1 and " * 50 + "u1 > 1", "characters long"),
     ],
 )
-def test_refuses_in_words(expression, words):
+def test_invalid_expression_is_refused(expression, words):
     with pytest.raises(UserError, match=words):
         Trigger(expression, NAMES)
 
@@ -129,7 +129,7 @@ def test_any_text_is_either_a_trigger_or_a_user_error(text):
     assert -1 <= trigger(data) < 3
 
 
-def test_a_wrong_expression_is_told_once_and_not_as_a_warning_too(recwarn):
+def test_invalid_expression_raises_no_additional_warning(recwarn):
     with pytest.raises(UserError):
         Trigger("abs(x) > 1in", ["x"])
     assert not recwarn.list

@@ -1,4 +1,4 @@
-"""A small trace for the tests: every value follows from the tick, so what is read back can be checked to the bit."""
+"""A small trace: every value is a function of the tick, so rows read back can be checked bit-exact."""
 
 import numpy as np
 
@@ -25,6 +25,6 @@ def make(first: int, count: int) -> np.ndarray:
 
 
 def is_truth(columns, ticks) -> bool:
-    """Whether `columns` (a table or a dict of arrays) are the rows of just these ticks, to the bit."""
+    """Whether `columns` (a table or a dict of arrays) are exactly the rows of these ticks, bit-exact."""
     truth = make(0, int(max(ticks, default=-1)) + 1)[np.asarray(ticks, dtype=int)]
     return all(np.array_equal(np.asarray(columns[name]), truth[name]) for name in ROW.names)
