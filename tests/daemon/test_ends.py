@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from waiting import gone, wait_for
 
 from rtctl.config.errors import UserError
 from rtctl.daemon.client import Client
@@ -70,22 +71,6 @@ def process(runtime: Path) -> Iterator[Callable[..., subprocess.Popen]]:
     for each in made:
         each.kill()
         each.communicate()
-
-
-def gone(pid: int) -> bool:
-    """Whether a process has ended; a zombie counts as ended."""
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "Z"
-    except (FileNotFoundError, ProcessLookupError):
-        return True
-
-
-def wait_for(what: Callable[[], Any], seconds: float) -> Any:
-    deadline = time.monotonic() + seconds
-    while not what():
-        assert time.monotonic() < deadline, "it did not come about"
-        time.sleep(0.01)
-    return what()
 
 
 @pytest.mark.realtime

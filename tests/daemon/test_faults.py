@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from waiting import gone, wait_for
 
 import rtctl
 from rtctl.config.errors import UserError
@@ -20,20 +21,6 @@ from rtctl.daemon.supervisor import Supervisor
 from rtctl.faults import processes
 from rtctl.faults.cases import STANDS
 from rtctl.trace.bundle import load_bundle
-
-
-def wait_for(what: Callable[[], Any], seconds: float = 30.0) -> None:
-    deadline = time.monotonic() + seconds
-    while not what():
-        assert time.monotonic() < deadline, "it did not come about"
-        time.sleep(0.01)
-
-
-def gone(pid: int) -> bool:
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "Z"
-    except (FileNotFoundError, ProcessLookupError):
-        return True
 
 
 def test_faults_are_added_listed_and_cleared(runtime: Path, config: Callable[..., Any]) -> None:

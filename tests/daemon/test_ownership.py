@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 import zmq
+from waiting import gone, wait_for
 
 from rtctl.daemon.server import CommandServer, runtime_dir
 from rtctl.daemon.session import Session
@@ -39,25 +40,9 @@ Session(config, Path(order["out"]), order["length"]).run()
 LONG = 1e6  # s of virtual time; the run is killed long before
 
 
-def wait_for(what: Callable[[], Any], seconds: float = 60.0) -> Any:
-    deadline = time.monotonic() + seconds
-    while not (found := what()):
-        assert time.monotonic() < deadline, "it did not come about"
-        time.sleep(0.01)
-    return found
-
-
 def left(config: Any) -> list[Path]:
     """Files of a machine in shared memory and in the folder of sockets."""
     return [*shared_folder().glob(f"{config.name}.*"), *runtime_dir().glob(f"{config.name}.*")]
-
-
-def gone(pid: int) -> bool:
-    """Whether a process has ended; a zombie counts as ended."""
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "Z"
-    except (FileNotFoundError, ProcessLookupError):
-        return True
 
 
 def status_of(path: Path) -> Any:

@@ -1,3 +1,4 @@
+import inspect
 import re
 
 import pytest
@@ -22,7 +23,7 @@ def test_class_and_function_names_of_a_user_file():
 def test_shipped_laws_satisfy_the_interface_of_user_laws(kind):
     found = builtin(f"rtctl.laws.{kind}", camel(kind))
     assert found.has("step") and found.has("reset")
-    assert set(own_law.SIGNALS) >= set(__import__("inspect").signature(found.module.step.py_func).parameters) - {
+    assert set(own_law.SIGNALS) >= set(inspect.signature(found.module.step.py_func).parameters) - {
         "p",
         "s",
     }
