@@ -1,10 +1,11 @@
 # make run    the reel unit under control, against its emulated twin, with a picture at the end
-# make test   the whole test suite
+# make test   the test suite without its long proofs; with them: make test MARKS=
 # make check  lint, format and types
 # make bounds the oldest libraries that pyproject.toml allows, tried in an environment of their own
 # make docs   the manual as a web site, build/site/index.html, and the man page
 
 PYTHON ?= python3
+MARKS ?= not long
 VENV := .venv
 BIN := $(VENV)/bin
 # bytecode is written of what is imported, when it is: most files of the libraries never are. Where it may not be
@@ -19,7 +20,7 @@ run: $(VENV)/installed
 
 # one thread of linear algebra for each of the two workers: more would wait for one another
 test: $(VENV)/installed-dev
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadgroup
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadgroup -m "$(MARKS)"
 
 bounds: $(VENV)/installed-dev
 	tests/packaging/lower_bounds.sh $(BIN)/python

@@ -5,6 +5,7 @@ import os
 import signal
 
 import numpy as np
+import pytest
 from narrowed import only
 
 from rtctl.diagnose.answer import answer, files
@@ -22,6 +23,7 @@ AMONG = (  # the full library takes a minute on the LDU
 )  # fmt: skip
 
 
+@pytest.mark.long
 def test_diagnosis_of_a_capture_names_the_hidden_effect_of_the_plant(started, runtime, tmp_path, monkeypatch):
     """Reel unit only; `rtctl prove` covers all machines."""
     machine, seed, reference, seconds = "ivu", 2, "steps", 13

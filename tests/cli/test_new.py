@@ -75,6 +75,7 @@ def test_invalid_name_is_refused(rtctl, tmp_path, words, message):
     assert not (tmp_path / "none").exists()
 
 
+@pytest.mark.long
 def test_tutorial_commands_run(rtctl, tmp_path, monkeypatch):
     """Runs the commands of the tutorial in order, in a new folder. Console blocks need real time and are skipped."""
     monkeypatch.chdir(tmp_path)

@@ -42,7 +42,9 @@ def answers(practice: Path) -> dict[str, Any]:
 
 
 @pytest.mark.skipif(FULL, reason="all of them are diagnosed")
-@pytest.mark.parametrize("case", LENGTHS)
+@pytest.mark.parametrize(
+    "case", ["case-0018", *(pytest.param(case, marks=pytest.mark.long) for case in ("case-0020", "case-0006"))]
+)
 def test_shortened_practice_bundles_are_diagnosed_correctly(practice, answers, case):
     found = written(diagnose_record(first(practice / case, LENGTHS[case])))
     result = score({case: answers[case]}, {case: found}, VISIBLE)

@@ -27,7 +27,10 @@ LOGS = {  # log -> description, its columns in the log, amplitude of the command
 }
 
 
-@pytest.mark.parametrize(("log", "verdict"), [("swing", "Nothing is missing"), ("axis", "The carriage rubs")])
+@pytest.mark.parametrize(
+    ("log", "verdict"),
+    [("swing", "Nothing is missing"), pytest.param("axis", "The carriage rubs", marks=pytest.mark.long)],
+)
 def test_documented_steps_lead_from_a_log_to_a_report(log, verdict, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     number, names, amplitude, terms = LOGS[log]

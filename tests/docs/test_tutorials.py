@@ -117,6 +117,7 @@ def test_recording_does_not_contain_the_hidden_effect(reel_unit):
     assert [abs(float(step[3])) for step in steps] == pytest.approx([full, half], abs=6e-4)
 
 
+@pytest.mark.long
 def test_reel_unit_tutorial_diagnoses_the_hidden_effect(reel_unit):
     said = words(reel_unit.through(DIAGNOSED))
     answer, seal = (words(text) for text in reel_unit.told(DIAGNOSED))
@@ -129,6 +130,7 @@ def test_reel_unit_tutorial_diagnoses_the_hidden_effect(reel_unit):
     assert {"report.html", "model.yaml"} <= {path.name for path in folder.iterdir()}
 
 
+@pytest.mark.long
 def test_diagnosed_model_improves_as_documented(reel_unit):
     said = reel_unit.through(5)
     page = (ROOT / "docs" / "tutorial_ivu.md").read_text()

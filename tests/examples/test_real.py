@@ -41,6 +41,7 @@ def test_real_recording_is_imported_and_ready_for_a_diagnosis(name, ran, tmp_pat
         assert told["lacks"] is None and told["rows"] > 0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", SHORT)
 def test_diagnosis_of_a_real_recording_agrees_with_the_known_effects(name, ran, tmp_path):
     case = CASES[name]

@@ -17,6 +17,7 @@ from rtctl.machines.described_plant import graph_of
 from rtctl.plants.graph.played import played
 from rtctl.tick import safety
 
+COUPLED = {"cart-pole", "furuta"}  # equations of a file, which take long to compile
 EXAMPLES = sorted(path.stem for path in (fused.CONFIGS / "machines").glob("*.yaml"))
 
 
@@ -96,7 +97,9 @@ def test_physics_term_can_act_at_any_body_but_not_at_a_spring():
         config("belt", plant__physics=[{"term": "friction.viscous", "node": "belt", "B": 1.0}])
 
 
-@pytest.mark.parametrize("name", EXAMPLES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.long) if name in COUPLED else name for name in EXAMPLES]
+)
 def test_halving_the_integration_step_changes_less_than_a_tenth_of_a_count(name):
     """Three seconds of a smooth command to every drive, scaled to the demand of its reference."""
     settings = config(name)

@@ -1,7 +1,9 @@
 """Every row of the thesis in its short version, and every figure."""
 
 import re
+from collections.abc import Iterable
 from functools import cache
+from typing import Any
 
 import pytest
 
@@ -11,6 +13,18 @@ from rtctl.reproduce import figures, rows, run
 PARTS = run.parts()
 NAMES = [(i, row.name) for i, part in enumerate(PARTS) for row in part.rows]
 FIGURES = [(i, number) for i, part in enumerate(PARTS) for number in part.figures]
+LONG = ("3", "11", "12")  # chapters whose experiments run for more than 20 s
+
+
+def by_chapter(names: Iterable[str], *values: Iterable[int]) -> list[Any]:
+    """Parameters of a test, those of LONG chapters with their mark."""
+    marks = {True: [pytest.mark.long], False: []}
+    return [
+        pytest.param(*given, name, id=name, marks=marks[name.partition(".")[0] in LONG])
+        for name, *given in zip(names, *values, strict=True)
+    ]
+
+
 WANTED = (
     "3.1 4.2 4.3 5.2 6.1 6.2 7.4 8.2 8.3 8.4 8.5 8.6 9.1 9.2 11.2 11.3 11.4 11.5 11.6 11.7 11.8 11.9 11.10 11.11 "
     "12.2 12.3 12.4 12.5 12.6 12.8 12.9 12.11 12.12"
@@ -27,7 +41,7 @@ def drawn(i: int, number: str) -> rows.Picture:
     return PARTS[i].figures[number](True)
 
 
-@pytest.mark.parametrize(("i", "name"), NAMES, ids=[name for _, name in NAMES])
+@pytest.mark.parametrize(("i", "name"), by_chapter([name for _, name in NAMES], [i for i, _ in NAMES]))
 def test_row_has_the_expected_verdict(i, name):
     row = played(i)[name]
     assert row.verdict != "fail", (
@@ -35,7 +49,7 @@ def test_row_has_the_expected_verdict(i, name):
     )
 
 
-@pytest.mark.parametrize(("i", "number"), FIGURES, ids=[number for _, number in FIGURES])
+@pytest.mark.parametrize(("i", "number"), by_chapter([number for _, number in FIGURES], [i for i, _ in FIGURES]))
 def test_figure_is_drawn(i, number, tmp_path):
     picture = drawn(i, number)
     assert picture.number == number
@@ -98,7 +112,7 @@ CORRECTED = {  # verdict and measured value of rows corrected after the first ve
 }
 
 
-@pytest.mark.parametrize("name", CORRECTED)
+@pytest.mark.parametrize("name", by_chapter(CORRECTED))
 def test_corrected_row_keeps_its_verdict_and_value(name):
     (i,) = (i for i, row in NAMES if row == name)
     row = played(i)[name]

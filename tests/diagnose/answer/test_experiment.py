@@ -86,6 +86,7 @@ def test_planned_motion_separates_laws_that_are_equivalent_at_one_speed():
     assert plan().untold == ""
 
 
+@pytest.mark.long
 def test_joint_diagnosis_with_the_experiment_names_the_law():
     d = both()
     assert d.verdict == NAMED

@@ -225,6 +225,7 @@ def test_listed_changes_are_the_differences_of_the_models(M, k):
     assert repair.between(AXIS, AXIS) == []
 
 
+@pytest.mark.long
 def test_repair_finds_a_spring_of_an_emulated_axis(runtime, config, tmp_path, monkeypatch):
     only(monkeypatch, "load.spring", "friction.coulomb", "drive.offset")
     machine = repair.ready(config("axis", set={"plant.physics": [SPRING]}))

@@ -38,6 +38,7 @@ def test_random_force_is_estimated_over_time():
     assert free.value.std() == pytest.approx(there.std(), rel=0.4)
 
 
+@pytest.mark.long
 def test_random_force_gives_an_unnamed_verdict():
     u = command(4.0)
     d = diagnose_record(record(case_of(PENDULUM), u, push=random_force(len(u), 0.15 * FORCE)))

@@ -45,6 +45,7 @@ def test_observer_bandwidth_is_limited_by_the_tick_rate():
     assert like.following(2.0).rows == like.rows
 
 
+@pytest.mark.long
 def test_all_models_of_a_search_use_its_final_observer(monkeypatch):
     monkeypatch.setattr("rtctl.diagnose.search.search.quicker", lambda fit: 2.0)
     like, space = named().found.like, named().found.base.space

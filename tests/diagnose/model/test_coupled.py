@@ -60,6 +60,7 @@ def test_every_independent_body_is_tracked(case, columns):
     assert push.shape == (len(columns["t"]), 2)
 
 
+@pytest.mark.long
 def test_joint_friction_is_named_at_the_pendulum(case, columns):
     found = diagnose_record(record_of(columns, read_case(case, Path("bundle")), Path("bundle")))
     assert [(e.name, e.node) for e in found.effects] == [("friction.coulomb", "pendulum")]

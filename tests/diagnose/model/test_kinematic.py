@@ -40,6 +40,7 @@ def test_nominal_nut_has_the_verdict_nothing():
     assert found("none").verdict == NOTHING
 
 
+@pytest.mark.long
 def test_backlash_of_a_rigid_nut_is_named():
     d = found("gap")
     assert d.verdict == NAMED
@@ -48,6 +49,7 @@ def test_backlash_of_a_rigid_nut_is_named():
     assert d.located.channel == "glass"
 
 
+@pytest.mark.long
 def test_periodic_lead_error_is_ambiguous_with_a_scale_error():
     d = found("ratio")  # two positions do not separate the lead from the scale
     assert d.verdict == AMBIGUOUS

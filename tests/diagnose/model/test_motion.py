@@ -87,6 +87,7 @@ def test_initial_position_and_speed_of_a_free_response_are_estimated():
     assert d.parameters["start.speed"].value == pytest.approx(2.0, abs=0.1)
 
 
+@pytest.mark.long
 def test_pendulum_described_as_a_spring_gets_a_softening_or_gravity():
     spring = {"bodies": {"rod": {"inertia": 3.3e-3, "viscous": 3e-4}}, "sensors": ROD["sensors"],
               "joints": {"k": {"from": "frame", "to": "rod", "stiffness": 0.2206}}}  # fmt: skip
