@@ -237,7 +237,7 @@ OFFSET = Term(
     act={"command": "{m}.volts[{c}] = drive.offset({p}, {m}.volts[{c}])"},
     stands=(stand("drive"),),
     look_alikes={
-        "friction.asymmetry": "at two places or loads of different friction: an offset stays, asymmetry grows with it",
+        "friction.asymmetry": "at two places or loads of different friction: an offset stays, asymmetry grows",
         "drive.gain_asymmetry": "command at one, two and three times the size: an offset does not grow with it",
         "drive.deadband": "commands of both signs: an offset shifts both the same way, a dead band towards zero",
         "load.spring": "the same short move at both ends of the travel: an offset is the same everywhere",
@@ -250,8 +250,8 @@ OFFSET = Term(
     passive=False,
     phrase=Phrase(
         noun="an offset",
-        head="{here} pushes when nothing is asked for",
-        detail="it gives {offset:+} at a command of zero",
+        head="{here} pushes at zero command",
+        detail="its output is off by {offset:+}",
         need="changes of command",
     ),
     check="Set the command to zero and measure the output of the amplifier; trim its zero.",
@@ -271,7 +271,7 @@ DEADBAND = Term(
     stands=(stand("drive"),),
     look_alikes={
         "friction.coulomb": "move it by hand or by the other motor: friction is still there, a dead band is not",
-        "drive.offset": "commands of both signs: a dead band loses on both, an offset gains on one",
+        "drive.offset": "commands of both signs: a dead band lowers both outputs, an offset raises one of them",
         "friction.stribeck": "a constant speed under growing load: a dead band shows by command, sticking by speed",
         "transmission.backlash": "small fast commands of one sign: a dead band loses them, backlash needs a reversal",
     },
@@ -303,7 +303,7 @@ GAIN_ASYMMETRY = Term(
     act={"command": "{m}.volts[{c}] = drive.gain_asymmetry({p}, {m}.volts[{c}])"},
     stands=(stand("drive"),),
     look_alikes={
-        "friction.asymmetry": "brake at speed: the gain goes by the sign of the command, friction by that of the speed",
+        "friction.asymmetry": "brake at speed: a gain follows the sign of the command, friction the sign of the speed",
         "drive.offset": "command at one, two and three times the size: a gain grows with it, an offset does not",
         "friction.load": "both signs of command at one tension: friction is the same for both, a gain is not",
     },
@@ -314,7 +314,7 @@ GAIN_ASYMMETRY = Term(
     phrase=Phrase(
         noun="unequal gain",
         head="{here} is stronger one way",
-        detail=("{a:%} {a:more|less} than asked for at positive commands and {a:%} {a:less|more} at negative ones"),
+        detail=("{a:%} {a:more|less} than commanded at positive commands and {a:%} {a:less|more} at negative ones"),
         need="commands of both signs",
     ),
     check=("Command the same size with either sign and measure both outputs; look for a weak half of the bridge."),
@@ -333,9 +333,9 @@ SATURATION = Term(
     act={"command": "{m}.volts[{c}] = drive.saturation({p}, {s}, {m}.volts[{c}])"},
     stands=(stand("drive"),),
     look_alikes={
-        "drive.supply_sag": "a hard push of one motor alone and of both: a limit does not ask what the other draws",
-        "drive.lag": "small and large steps: a lag takes the same time for both, a limit only spoils the large",
-        "transmission.slip": "hold the load still and push: a limit shows in the force, slip in a way that is lost",
+        "drive.supply_sag": "a hard push of one motor alone and of both: a limit does not depend on the other motor",
+        "drive.lag": "small and large steps: a lag takes the same time for both, a limit changes the large",
+        "transmission.slip": "hold the load still and push: a limit shows in the force, slip in lost travel",
         "friction.viscous": "hard acceleration from standstill: a limit shows at once, drag only at speed",
     },
     typical={"limit": (0.3, 0.9)},
@@ -344,9 +344,9 @@ SATURATION = Term(
     order=20,
     state=SATURATION_STATE,
     phrase=Phrase(
-        noun="a lower limit",
-        head="{here} runs out of push",
-        detail="beyond {limit} there is no more",
+        noun="saturation",
+        head="{here} saturates",
+        detail="its output stops at {limit}",
         need="commands near the limit",
     ),
     check="Look at the current limit that is set in the amplifier and at the voltage of its supply.",
@@ -371,8 +371,8 @@ SUPPLY_SAG = Term(
         stand("drive", "supply"),
     ),
     look_alikes={
-        "drive.saturation": "a hard push of one motor alone and of both: sag asks what the other draws",
-        "drive.thermal": "the same burst cold and after a minute: sag is there from the first moment",
+        "drive.saturation": "a hard push of one motor alone and of both: sag depends on what the other motor draws",
+        "drive.thermal": "the same burst cold and after a minute: sag shows from the first moment",
         "friction.viscous": "hold the load still and command more: sag shows without speed",
         "friction.load": "load the other motor at constant tension: sag changes the gain, friction stays",
     },
@@ -383,7 +383,7 @@ SUPPLY_SAG = Term(
     phrase=Phrase(
         noun="a weak supply",
         head="the supply of {here} sags",
-        detail="{k:%} is lost for each {form:words} that all drives ask for",
+        detail="{k:%} is lost for each {form:words} of all drives together",
         need="hard work of all drives at once",
         forms={"": "{command}", "power": "{command} squared"},
     ),

@@ -173,9 +173,9 @@ LAG = Term(
     stands=(stand("drive"),),
     look_alikes={
         "timing.delay": "a sweep up to half the sample rate: a lag weakens the fast part, a delay only turns its phase",
-        "structure.resonance": "a sweep: a lag falls off for good, a resonance has a peak",
+        "structure.resonance": "a sweep: the gain of a lag only falls, a resonance has a peak",
         "tape.viscoelastic": "one motor with the tape off: a lag stays",
-        "drive.saturation": "small and large steps: a lag takes the same time for both, a limit only spoils the large",
+        "drive.saturation": "small and large steps: a lag takes the same time for both, a limit changes the large",
     },
     typical={"tau": (0.3, 3.0)},
     scale={"tau": "sample period"},
@@ -184,8 +184,8 @@ LAG = Term(
     state=LAG_STATE,
     phrase=Phrase(
         noun="a lag",
-        head="{here} comes late and soft",
-        detail="it takes {tau} to build up what is asked for",
+        head="{here} responds with a lag",
+        detail="its output follows the command with a time constant of {tau}",
         need="quick changes of the command",
     ),
     check="Look for a filter on the command input and at the gains of the current loop.",
@@ -212,7 +212,7 @@ THERMAL = Term(
         stand("body", "rubs"),
     ),
     look_alikes={
-        "drive.supply_sag": "the same burst cold and after a minute of work: sag is there from the first moment",
+        "drive.supply_sag": "the same burst cold and after a minute of work: sag shows from the first moment",
         "geometry.radius_change": "wind there and back slowly: a radius comes back with the tape, heat does not",
         "friction.coulomb": "the same slow move cold and warm: Coulomb friction does not change",
     },
@@ -222,7 +222,7 @@ THERMAL = Term(
     passive=False,
     state=THERMAL_STATE,
     phrase=Phrase(
-        noun="drift with warmth",
+        noun="thermal drift",
         head="{here} changes as it warms",
         detail="{a:%} {a:weaker|stronger} once warm, with a time constant of {tau}",
         need="a longer time of hard work",

@@ -135,9 +135,9 @@ LOAD = Term(
     axis="tension",
     order=110,
     phrase=Phrase(
-        noun="friction from load",
-        head="{here} drags by its load",
-        detail="friction {mu:grows|falls} by {mu:%} of the load",
+        noun="load-dependent friction",
+        head="the friction of {here} depends on its load",
+        detail="it {mu:grows|falls} by {mu:%} of the load",
         need="moves under several loads",
     ),
     check="Pull slowly with and without the load; look at the bearing that carries it.",

@@ -137,9 +137,9 @@ RADIUS_CHANGE = Term(
     },
     stands=(stand("body", "reel"),),
     look_alikes={
-        "sensor.scale": "two turns and two more: a growing reel goes with the square of the way, a factor does not",
+        "sensor.scale": "two turns and two more: a growing reel errs by the square of the way, a scale does not",
         "drive.thermal": "wind there and back slowly: a radius comes back with the tape, heat does not",
-        "tape.viscoelastic": "hold the tape still under tension: a radius waits, relaxation goes on",
+        "tape.viscoelastic": "hold the tape still under tension: a radius stays, relaxation goes on",
         "transmission.creep": "the same winding at two tensions: creep grows with the force, a radius does not",
         "load.spring": "the same short move at both ends of the travel: a spring pulls at rest, a radius does not",
     },

@@ -138,10 +138,10 @@ THICKNESS = Term(
     ),
     look_alikes={
         "ripple.capstan": "lift the carriage, turn the capstan half a turn and repeat: only the capstan's wave moves",
-        "ripple.encoder": "start from another angle of the shaft: a disc goes with the angle, a strip with the place",
+        "ripple.encoder": "start from another angle of the shaft: a disc errs by the angle, a strip by the place",
         "load.bump": "the same travel seen by both sensors: thickness shows as a difference, a bump in both",
         "sensor.scale": "travel over several wavelengths: a scale error grows, waves do not",
-        "guide.strip": "travel over several wavelengths: the way along a wavy strip grows, thickness does not",
+        "guide.strip": "travel over several wavelengths: the path along a wavy strip grows, thickness does not",
         "guide.dirt": "several wavelengths of travel: dirt is at one place, thickness everywhere",
     },
     typical={"A": (2e-6, 5e-4), "wavelength": (0.02, 0.3)},
@@ -179,7 +179,7 @@ STRIP = Term(
     ),
     look_alikes={
         "sensor.scale": "look for the waves on top of the trend, two to each wave of the strip: a scale error has none",
-        "guide.thickness": "travel over several wavelengths: the way along a wavy strip grows, thickness does not",
+        "guide.thickness": "travel over several wavelengths: the path along a wavy strip grows, thickness does not",
     },
     typical={"longer": (1e-6, 1e-4), "wavelength": (0.05, 0.3)},
     axis="position",
@@ -187,7 +187,7 @@ STRIP = Term(
     phrase=Phrase(
         noun="a wavy strip",
         head="the strip at {here} is wavy",
-        detail="the way along it is {longer:%} longer than straight, in waves of {wavelength}",
+        detail="the path along it is {longer:%} longer than a straight one, in waves of {wavelength}",
         need=WAVES,
     ),
     check="Lay a straight edge along the strip and look for gaps; look at its tension and its supports.",

@@ -196,7 +196,7 @@ SPRING = Term(
         "drive.offset": "the same short move at both ends of the travel: an offset is the same everywhere",
         "load.cable_chain": "approach one place from both sides slowly: a spring pulls the same, a chain does not",
         "structure.stiffening": "displacements of one, two and three: a spring pulls in proportion",
-        "friction.asymmetry": "the same short move at both ends of the travel: friction does not ask where",
+        "friction.asymmetry": "the same short move at both ends of the travel: friction is the same everywhere",
     },
     typical={"k": (0.2, 1.0)},
     scale={"k": "force/travel"},
@@ -224,8 +224,8 @@ CABLE_CHAIN = Term(
     stands=(stand("body", "bounded"),),
     look_alikes={
         "load.spring": "approach one place from both sides slowly: a spring pulls the same, a chain does not",
-        "friction.presliding": "reverse in mid-travel: bristles turn within a tiny way, a chain within a long one",
-        "friction.coulomb": "reverse and look at the first piece of the way: Coulomb friction turns at once",
+        "friction.presliding": "reverse in mid-travel: bristles reverse within a tiny way, a chain within a long one",
+        "friction.coulomb": "reverse and look at the first part of the move: Coulomb friction reverses at once",
     },
     typical={"k": (0.2, 1.0), "F_h": (0.1, 0.5), "z_h": (0.01, 0.1)},
     scale={"k": "force/travel", "F_h": "force", "z_h": "travel"},
@@ -235,7 +235,7 @@ CABLE_CHAIN = Term(
     phrase=Phrase(
         noun="a cable chain",
         head="a cable chain pulls {here}",
-        detail="{k} by position and {F_h} of drag",
+        detail="{k} by position and {F_h} of friction",
         need="long moves with reversals",
     ),
     check="Unhook the cable chain and repeat the move.",
@@ -263,7 +263,7 @@ IMBALANCE = Term(
     phrase=Phrase(
         noun="imbalance",
         head="{here} is heavy on one side",
-        detail="{A} helps once a turn and hinders once a turn",
+        detail="{A} helps once and hinders once in each turn",
         need=TURNS,
     ),
     check=(
@@ -291,7 +291,7 @@ BUMP = Term(
         "sensor.missed_counts": "pass the place ten times: a bump comes back to zero error, lost counts add up",
         "guide.thickness": "the same travel seen by both sensors: thickness shows as a difference, a bump in both",
         "load.imbalance": "one slow turn: a bump is narrow, imbalance a sine",
-        "ripple.cogging": "several turns: a bump stands at one place, cogging everywhere",
+        "ripple.cogging": "several turns: a tight spot is at one place, cogging everywhere",
     },
     typical={"F": (0.2, 1.0), "width": (0.005, 0.05)},
     scale={"F": "force", "width": "travel"},

@@ -97,7 +97,7 @@ INERTIA = Term(
     phrase=Phrase(
         noun="uneven inertia",
         head="{here} is heavier to turn at some angles",
-        detail="its inertia is up to {A} more and less",
+        detail="its inertia is up to {A} above and below its mean",
         need=f"{TURNS}, with strong acceleration",
     ),
     check="Look for a crank or a linkage behind it, and compare how fast it starts at several angles.",

@@ -128,7 +128,7 @@ PRESLIDING = Term(
     act={"force": "presliding.replace({p}, {s}, {m}, {i}, {r})"},
     stands=(stand("body", "dry"),),
     look_alikes={
-        "friction.stribeck": "reverse by a tiny way: plain dry friction holds still, bristles move as a spring",
+        "friction.stribeck": "reverse by a tiny distance: dry friction stands still, bristles move as a spring",
         "transmission.backlash": "reverse with a small force: bristles push back at once, a gap does not",
         "tape.viscoelastic": "hold and wait: bristles stay where they are, a relaxing tape moves on",
         "timing.delay": "steps far below break-away: a delay does not let a stuck node move",
@@ -140,8 +140,8 @@ PRESLIDING = Term(
     state=PRESLIDING_STATE,
     phrase=Phrase(
         noun="a spring before breakaway",
-        head="{here} gives like a spring before it breaks away",
-        detail="it springs over {z_s}",
+        head="{here} moves like a spring before it breaks away",
+        detail="the spring acts over {z_s}",
         need="standstills and slow reversals",
     ),
     check="Push lightly without moving it, let go and see whether it springs back; look at seals and wipers.",

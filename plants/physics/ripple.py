@@ -131,9 +131,9 @@ COGGING = Term(
     look_alikes={
         "load.imbalance": "turn slowly and count: imbalance comes once a turn, cogging many times",
         "ripple.reel": "the same turns at another tension: cogging stays, an eccentric reel follows the tension",
-        "ripple.encoder": "slow and fast turns: a force fades behind the inertia when it is fast, a reading error not",
+        "ripple.encoder": "slow and fast turns: the inertia hides a force in fast turns, a reading error stays",
         "structure.resonance": "two constant speeds: cogging keeps its angle, a resonance its frequency",
-        "load.bump": "several turns: a bump stands at one place, cogging everywhere",
+        "load.bump": "several turns: a tight spot is at one place, cogging everywhere",
     },
     typical={"A": (0.02, 0.3), "per_turn": (3, 48)},
     scale={"A": "force"},
@@ -181,7 +181,7 @@ ENCODER = Term(
         "change the tape's tension: a capstan out of round pulls harder, a reading error stays",
         "ripple.cogging": "slow and fast turns: a reading error does not fade with the inertia, a force does",
         "load.imbalance": "slow and fast turns: a reading error does not fade with the inertia, a force does",
-        "guide.thickness": "start from another angle of the shaft: a disc goes with the angle, a strip with the place",
+        "guide.thickness": "start from another angle of the shaft: a disc errs by the angle, a strip by the place",
         "ripple.reel": "wind until the reel has another radius: a reel's wave in the capstan's angle moves with it",
         "timing.jitter": "two constant speeds: ripple stays on its angle, jitter has none and grows with speed",
     },
@@ -191,7 +191,7 @@ ENCODER = Term(
     phrase=Phrase(
         noun="a disc off centre",
         head="the disc of {here} is off centre",
-        detail="it reads up to {A} ahead and behind once a turn{harmonics:words}",
+        detail="it reads up to {A} too much and too little once a turn{harmonics:words}",
         need=TURNS,
     ),
     check=(

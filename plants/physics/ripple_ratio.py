@@ -126,7 +126,7 @@ RATIO = Term(
     look_alikes={
         "ripple.encoder": "sensors on both ends: a ratio moves the far end, a reading error only its own sensor",
         "ripple.cogging": "slow and fast turns: a ratio moves the far end as far at any low speed, a force fades",
-        "load.imbalance": "lay the axis level: imbalance hangs on gravity, a ratio on nothing",
+        "load.imbalance": "lay the axis level: imbalance depends on gravity, a ratio does not",
         "ripple.torque": "turn by hand with the power off: a ratio is still there, a gain is not",
     },
     typical={"A": (1e-4, 1e-2)},

@@ -75,9 +75,9 @@ SLEW = Term(
     act={"command": "{m}.volts[{c}] = slew.slew({p}, {s}, {m}.volts[{c}])"},
     stands=(stand("drive", "general"),),
     look_alikes={
-        "drive.lag": "small and large steps: a lag takes the same time for both, a rate limit only spoils the large",
+        "drive.lag": "small and large steps: a lag takes the same time for both, a rate limit changes only large steps",
         "timing.delay": "small and large steps: a delay is the same time for both",
-        "drive.saturation": "hold a large command: a limit stays short of it, a rate limit gets there",
+        "drive.saturation": "hold a large command: a limit never reaches it, a rate limit does",
     },
     typical={"rate": (0.2, 0.9)},
     scale={"rate": "largest command"},

@@ -119,7 +119,7 @@ RESONANCE = Term(
     stands=(stand("body"),),
     look_alikes={
         "timing.delay": "a sweep through the frequency: a resonance has a dip and a peak, a delay only lags",
-        "drive.lag": "a sweep through the frequency: a lag falls off and never rings",
+        "drive.lag": "a sweep through the frequency: the gain of a lag only falls, it has no peak",
         "tape.viscoelastic": "let go and listen: a relaxing tape does not ring",
         "ripple.cogging": "two speeds: ripple moves with the speed, a resonance stays at its frequency",
     },
@@ -158,7 +158,7 @@ STIFFENING = Term(
     },
     stands=(stand("joint", "spring"),),
     look_alikes={
-        "tape.viscoelastic": "the same load slowly and fast: stiffening does not ask how fast",
+        "tape.viscoelastic": "the same load slowly and fast: stiffening does not depend on the speed",
         "transmission.backlash": "small motions about the middle: a gap is loose there, a cubic spring is linear",
         "load.spring": "sweep at two amplitudes: only with the cubic does the resonance move",
     },
@@ -167,7 +167,7 @@ STIFFENING = Term(
     axis="position",
     order=80,
     phrase=Phrase(
-        noun="a bent spring law",
+        noun="a nonlinear spring",
         head="the spring at {here} grows {c3:stiffer|softer} as it bends",
         detail="its cubic stiffness is {c3:+}",
         need="large deflections",

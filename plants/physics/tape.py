@@ -133,8 +133,8 @@ VISCOELASTIC = Term(
     order=90,
     state=VISCOELASTIC_STATE,
     phrase=Phrase(
-        noun="slow give",
-        head="{here} gives way slowly",
+        noun="slow relaxation",
+        head="{here} yields slowly",
         detail="a stiffness of {c_branch} relaxes within {tau}",
         need="changes of tension",
     ),
@@ -157,8 +157,8 @@ SLACK = Term(
     },
     stands=(stand("joint", "spring span"),),
     look_alikes={
-        "transmission.backlash": "the same moves at a higher tension: the tape stays taut, play stays",
-        "transmission.slip": "the same moves at a higher tension: slack goes, slip goes too but leaves a lost way",
+        "transmission.backlash": "the same moves at a higher tension: the tape stays taut, backlash stays",
+        "transmission.slip": "the same moves at a higher tension: both disappear, but slip leaves lost travel",
     },
     axis="tension",
     order=90,

@@ -153,7 +153,7 @@ DELAY = Term(
         "structure.resonance": "a sweep: a delay leaves the gain as it is",
         "friction.presliding": "tiny and large motions: a delay turns the phase of both alike",
         "tape.viscoelastic": "one motor with the tape off: a delay stays",
-        "transmission.backlash": "small and large reversals: a delay is the same time, backlash the same way",
+        "transmission.backlash": "small and large reversals: a delay is a constant time, backlash a constant distance",
     },
     typical={"extra": (0.3, 3.0)},
     scale={"extra": "sample period"},

@@ -167,8 +167,8 @@ BACKLASH = Term(
     ),
     look_alikes={
         "friction.presliding": "reverse with a small force: in a gap nothing pushes back, bristles do at once",
-        "drive.deadband": "push both ways against a stop: a dead band has no memory of the side that it came from",
-        "friction.stribeck": "reverse at several speeds: the lost way stays the same, the sticking time does not",
+        "drive.deadband": "push both ways against a stop: a dead band does not depend on the side it came from",
+        "friction.stribeck": "reverse at several speeds: the lost travel stays the same, the sticking time does not",
         "structure.stiffening": "load from zero to full: past the gap the stiffness is constant again",
     },
     typical={"gap": (2e-4, 4e-3)},
@@ -178,7 +178,7 @@ BACKLASH = Term(
     joint=joint,
     state=BACKLASH_STATE,
     phrase=Phrase(
-        noun="play",
+        noun="backlash",
         head="{here} has play",
         detail="{gap} is lost on each reversal",
         need="reversals",
