@@ -41,7 +41,7 @@ class SlipSettings(Settings):
 
     term: Literal["transmission.slip"] = "transmission.slip"
     node: Node
-    F_max: float = quantity(unit="", gt=0, le=1e6, help="what the contact carries, N (Nm of the motor at a wheel)")
+    F_max: float = quantity(unit="", gt=0, le=1e6, help="largest force of the contact, N (Nm of the motor at a wheel)")
     eta: float = quantity(
         0.0, unit="", ge=0, le=1e9, help="force beyond F_max per sliding speed, N s/m (Nm s/rad at a wheel)"
     )
@@ -54,11 +54,11 @@ class CreepSettings(Settings):
     term: Literal["transmission.creep"] = "transmission.creep"
     node: Node
     kappa: float = quantity(
-        0.0, unit="", ge=0, le=1e3, help="way lost per way and force, 1/N (1/Nm of the motor at a wheel)"
+        0.0, unit="", ge=0, le=1e3, help="share of travel lost per force, 1/N (1/Nm of the motor at a wheel)"
     )
     R_c: float = quantity(3e-3, unit="m", gt=0, help="radius of the LDU's capstan, where the strip creeps")
     rate: float = quantity(
-        0.0, unit="", ge=0, le=1e6, help="way lost per second and force, at a joint of a described machine"
+        0.0, unit="", ge=0, le=1e6, help="travel lost per second and force, at a joint of a described machine"
     )
 
 

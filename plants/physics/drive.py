@@ -28,7 +28,7 @@ class OffsetSettings(Settings):
 
     term: Literal["drive.offset"] = "drive.offset"
     node: Node
-    offset: float = quantity(unit="V", ge=-10, le=10, help="what stands at the driver when nothing is asked for")
+    offset: float = quantity(unit="V", ge=-10, le=10, help="input of the driver at a command of zero")
 
 
 class OffsetParams(NamedTuple):
@@ -57,7 +57,7 @@ class DeadbandSettings(Settings):
     node: Node
     band: float = quantity(unit="V", ge=0, le=5, help="half width of the dead zone")
     form: Literal["shift", "cut", "floor"] = Field(
-        default="shift", description="beyond the band: from zero on, a jump to the command, or +-band within it too"
+        default="shift", description="output: from zero on beyond the band, a jump to the command, or at least +-band"
     )
     edge: float = quantity(0.1, unit="", ge=0, le=1, help="half width of the jump of `cut`, as a share of band")
 
@@ -120,11 +120,11 @@ class SaturationSettings(Settings):
 
     term: Literal["drive.saturation"] = "drive.saturation"
     node: Node
-    limit: float = quantity(unit="V", gt=0, le=1e3, help="the output gets no further than this")
-    knee: float = quantity(0.0, unit="", ge=0, le=0.9, help="share of the limit at which it starts to bend; 0 is sharp")
-    rise: float = quantity(0.0, unit="s/V", ge=0, le=10, help="time that a change of one volt takes; 0 is at once")
+    limit: float = quantity(unit="V", gt=0, le=1e3, help="largest output")
+    knee: float = quantity(0.0, unit="", ge=0, le=0.9, help="rounding of the limit, as a share of it; 0 is sharp")
+    rise: float = quantity(0.0, unit="s/V", ge=0, le=10, help="time of a change of one volt; 0: no limit")
     form: Literal["parabola", "rapp"] = Field(
-        default="parabola", description="how it bends: over the knee alone, or ever more, u/(1 + (u/limit)^p)^(1/p)"
+        default="parabola", description="rounding: over the knee only, or at all sizes, u/(1 + (u/limit)^p)^(1/p)"
     )
 
 
@@ -187,10 +187,10 @@ class SupplySagSettings(Settings):
     node: Node
     k: float = quantity(unit="", ge=0, le=1, help="share of gain lost per volt, or per volt squared, of all drives")
     form: Literal["current", "power", "drawn"] = Field(
-        default="current", description="what loads the supply: |volts|, their square, or what is left of |volts|"
+        default="current", description="load of the supply: |volts|, their square, or |volts| after the sag"
     )
-    tau: float = quantity(0.0, unit="s", ge=0, le=10, help="time constant of the supply's capacitor; 0: it has none")
-    feeds: Literal["all", "own"] = Field(default="all", description="all drives, or the drive at the node alone")
+    tau: float = quantity(0.0, unit="s", ge=0, le=10, help="time constant of the supply's capacitor; 0: none")
+    feeds: Literal["all", "own"] = Field(default="all", description="drives on the supply: all, or the one at the node")
 
 
 class SupplySagParams(NamedTuple):

@@ -31,8 +31,8 @@ class LagSettings(Settings):
 
     term: Literal["drive.lag"] = "drive.lag"
     node: Node
-    tau: float = quantity(unit="s", ge=0, le=10, help="how late it is; 0 is no lag")
-    order: Literal[1, 2] = Field(default=1, description="of the lag")
+    tau: float = quantity(unit="s", ge=0, le=10, help="time constant of the lag; 0 is no lag")
+    order: Literal[1, 2] = Field(default=1, description="order of the lag")
     zeta: float = quantity(0.7, unit="", ge=0.05, le=20, help="damping of order 2")
 
 
@@ -81,15 +81,15 @@ class ThermalSettings(Settings):
 
     term: Literal["drive.thermal"] = "drive.thermal"
     node: Node
-    a: float = quantity(unit="", ge=-2, le=5, help="loss at V_ref when warm through; negative where it gains")
-    tau: float = quantity(30.0, unit="s", gt=0, le=1e5, help="time that it takes to warm")
-    V_ref: float = quantity(1.0, unit="V", gt=0, le=100, help="steady command at which it is warm")
+    a: float = quantity(unit="", ge=-2, le=5, help="loss at V_ref when warm; negative: an increase")
+    tau: float = quantity(30.0, unit="s", gt=0, le=1e5, help="time constant of the warming")
+    V_ref: float = quantity(1.0, unit="V", gt=0, le=100, help="steady command of the loss a")
     ease: float = quantity(
-        0.0, unit="", ge=-2, le=5, help="of a drive: loss of the dry friction that it works against, in the same way"
+        0.0, unit="", ge=-2, le=5, help="of a drive: loss of the dry friction at its body when warm, as a"
     )
     form: Literal["exponential", "linear", "hyperbolic"] = Field(
         default="exponential",
-        description="of what is left at heat h: exp(-a h), 1 - a h (magnets), 1/(1 + a h) (resistance)",
+        description="factor of the gain at heat h: exp(-a h), 1 - a h (magnets), 1/(1 + a h) (resistance)",
     )
 
 

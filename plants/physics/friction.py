@@ -76,7 +76,7 @@ class QuadraticSettings(Settings):
 
     term: Literal["friction.quadratic"] = "friction.quadratic"
     node: Node
-    Q: float = quantity(unit="", ge=0, le=1e6, help="drag by the square of speed, Nms^2/rad^2 or Ns^2/m^2 by node")
+    Q: float = quantity(unit="", ge=0, le=1e6, help="quadratic drag, Nms^2/rad^2 or Ns^2/m^2 by node")
 
 
 class QuadraticParams(NamedTuple):
@@ -103,11 +103,11 @@ class StribeckSettings(Settings):
     term: Literal["friction.stribeck"] = "friction.stribeck"
     node: Node
     F_s: float = quantity(
-        unit="", ge=0, le=1e4, help="dry friction at standstill, but for what other terms add, Nm or N by node"
+        unit="", ge=0, le=1e4, help="dry friction at standstill, without other terms, Nm or N by node"
     )
     v_s: float = quantity(unit="", gt=0, le=1e3, help="Stribeck speed, rad/s or m/s by node")
     form: Literal["gaussian", "exponential", "tustin"] = Field(
-        default="gaussian", description="how it falls with speed: exp(-(v/v_s)^2), exp(-|v|/v_s), 1/(1 + |v|/v_s)"
+        default="gaussian", description="fall with speed: exp(-(v/v_s)^2), exp(-|v|/v_s), 1/(1 + |v|/v_s)"
     )
 
 

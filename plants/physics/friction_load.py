@@ -31,9 +31,9 @@ class LoadSettings(Settings):
 
     term: Literal["friction.load"] = "friction.load"
     node: Node
-    mu: float = quantity(unit="", ge=-1.0, le=1.0, help="friction as a share of the force that presses, at its lever")
+    mu: float = quantity(unit="", ge=-1.0, le=1.0, help="friction as a share of the load, at its lever")
     by: Literal["joints", "weight"] = Field(
-        default="joints", description="what presses at a body of a described machine: its joints, or its weight"
+        default="joints", description="load of a body of a described machine: its joints, or its weight"
     )
 
 

@@ -31,12 +31,12 @@ class PositionSettings(Settings):
 
     term: Literal["friction.position"] = "friction.position"
     node: Node
-    A: float = quantity(unit="", ge=-1e4, le=1e4, help="amplitude of dry friction along the way, Nm or N by node")
+    A: float = quantity(unit="", ge=-1e4, le=1e4, help="amplitude of the change of dry friction, Nm or N by node")
     phi: float = quantity(0.0, unit="rad", ge=-100, le=100, help="phase at position 0")
-    length: float = quantity(unit="", gt=0, le=1e3, help="of a wave; width of a step or a spot; rad or m by node")
-    form: Literal["wave", "step", "spot"] = Field(default="wave", description="how it changes")
-    at: float = quantity(0.0, unit="", ge=-1e6, le=1e6, help="where the step or the spot is, rad or m by node")
-    slope: float = quantity(0.0, unit="", ge=-1e6, le=1e6, help="growth of dry friction along the way, N/m or Nm/rad")
+    length: float = quantity(unit="", gt=0, le=1e3, help="length of a wave; width of a step or spot; rad or m by node")
+    form: Literal["wave", "step", "spot"] = Field(default="wave", description="shape of the change")
+    at: float = quantity(0.0, unit="", ge=-1e6, le=1e6, help="position of the step or the spot, rad or m by node")
+    slope: float = quantity(0.0, unit="", ge=-1e6, le=1e6, help="growth of dry friction with position, N/m or Nm/rad")
 
 
 class PositionParams(NamedTuple):

@@ -26,12 +26,12 @@ class ThicknessSettings(Settings):
     term: Literal["guide.thickness"] = "guide.thickness"
     node: Node
     A: float = quantity(unit="m", ge=-1e-2, le=1e-2, help="amplitude of the position error")
-    wavelength: float = quantity(0.15, unit="m", gt=1e-4, le=1e2, help="along the guide")
+    wavelength: float = quantity(0.15, unit="m", gt=1e-4, le=1e2, help="wavelength along the guide")
     phi: float = quantity(0.0, unit="rad", ge=-100, le=100, help="phase at position 0")
     A2: float = quantity(0.0, unit="m", ge=-1e-2, le=1e-2, help="amplitude at half the wavelength")
-    phi2: float = quantity(0.0, unit="rad", ge=-100, le=100, help="its phase")
+    phi2: float = quantity(0.0, unit="rad", ge=-100, le=100, help="phase of the second harmonic")
     A3: float = quantity(0.0, unit="m", ge=-1e-2, le=1e-2, help="amplitude at a third of the wavelength")
-    phi3: float = quantity(0.0, unit="rad", ge=-100, le=100, help="its phase")
+    phi3: float = quantity(0.0, unit="rad", ge=-100, le=100, help="phase of the third harmonic")
 
 
 class ThicknessParams(NamedTuple):
@@ -63,8 +63,8 @@ class StripSettings(Settings):
 
     term: Literal["guide.strip"] = "guide.strip"
     node: Node
-    longer: float = quantity(unit="", ge=0, le=0.02, help="share by which the path is longer than straight")
-    wavelength: float = quantity(0.1, unit="m", gt=1e-4, le=1e2, help="of the waves of the strip")
+    longer: float = quantity(unit="", ge=0, le=0.02, help="share by which the path is longer than a straight one")
+    wavelength: float = quantity(0.1, unit="m", gt=1e-4, le=1e2, help="wavelength of the strip")
     phi: float = quantity(0.0, unit="rad", ge=-100, le=100, help="phase at position 0")
 
 
@@ -97,7 +97,7 @@ class DirtSettings(Settings):
     term: Literal["guide.dirt"] = "guide.dirt"
     node: Node
     A: float = quantity(unit="m", ge=-1e-2, le=1e-2, help="largest position error")
-    at: float = quantity(unit="m", ge=-100, le=100, help="position of its middle")
+    at: float = quantity(unit="m", ge=-100, le=100, help="position of the middle")
     width: float = quantity(1e-3, unit="m", gt=1e-6, le=10, help="standard deviation of the bell")
 
 

@@ -34,10 +34,10 @@ class HysteresisSettings(Settings):
 
     term: Literal["transmission.hysteresis"] = "transmission.hysteresis"
     node: Node
-    F_h: float = quantity(unit="", ge=0, le=1e5, help="part of the pull that turns with direction, N or Nm by joint")
-    z_h: float = quantity(unit="", gt=0, le=10, help="deflection over which it turns, m or rad by joint")
+    F_h: float = quantity(unit="", ge=0, le=1e5, help="force that reverses with direction, N or Nm by joint")
+    z_h: float = quantity(unit="", gt=0, le=10, help="deflection over which F_h reverses, m or rad by joint")
     form: Literal["dahl", "bouc_wen"] = Field(
-        default="dahl", description="how it turns: like an exponential, or rounder, like a hyperbolic tangent"
+        default="dahl", description="reversal: exponential, or rounder, like a hyperbolic tangent"
     )
 
 

@@ -29,9 +29,9 @@ class SpringSettings(Settings):
     term: Literal["load.spring"] = "load.spring"
     node: Node
     k: float = quantity(unit="", ge=-1e6, le=1e6, help="stiffness, N/m or Nm/rad by node; negative pushes away")
-    x0: float = quantity(0.0, unit="", ge=-1e3, le=1e3, help="where it does not pull, m or rad by node")
+    x0: float = quantity(0.0, unit="", ge=-1e3, le=1e3, help="position of zero force, m or rad by node")
     bend: float = quantity(
-        0.0, unit="", ge=-1e12, le=1e12, help="1/m^2 or 1/rad^2: it stiffens far from x0, or yields where negative"
+        0.0, unit="", ge=-1e12, le=1e12, help="stiffening with distance from x0, 1/m^2 or 1/rad^2; negative softens"
     )
 
 
@@ -65,9 +65,9 @@ class CableChainSettings(Settings):
     term: Literal["load.cable_chain"] = "load.cable_chain"
     node: Node
     k: float = quantity(unit="", ge=0, le=1e6, help="stiffness of the chain's bend, N/m")
-    x0: float = quantity(0.0, unit="", ge=-1e3, le=1e3, help="where it does not pull, m")
-    F_h: float = quantity(0.0, unit="", ge=0, le=1e4, help="drag of links and cables on each other, N")
-    z_h: float = quantity(5e-3, unit="", gt=0, le=10.0, help="way after a reversal until the drag has turned, m")
+    x0: float = quantity(0.0, unit="", ge=-1e3, le=1e3, help="position of zero force, m")
+    F_h: float = quantity(0.0, unit="", ge=0, le=1e4, help="friction of links and cables on each other, N")
+    z_h: float = quantity(5e-3, unit="", gt=0, le=10.0, help="travel over which the friction reverses, m")
 
 
 class CableChainParams(NamedTuple):
@@ -133,14 +133,12 @@ class BumpSettings(Settings):
     term: Literal["load.bump"] = "load.bump"
     node: Node
     F: float = quantity(unit="", ge=-1e4, le=1e4, help="largest force, N or Nm by node")
-    at: float = quantity(unit="", ge=-1e4, le=1e4, help="position of its middle, m or rad by node")
+    at: float = quantity(unit="", ge=-1e4, le=1e4, help="position of the middle, m or rad by node")
     width: float = quantity(unit="", gt=0, le=1e3, help="standard deviation of the bell, m or rad by node")
     form: Literal["drag", "hill", "push"] = Field(
-        default="drag", description="against the motion, away from the middle, or always forwards"
+        default="drag", description="direction of the force: against the motion, away from the middle, or forwards"
     )
-    every_turn: bool = Field(
-        default=False, description="of a node that turns: at each turn instead of at one unwrapped angle"
-    )
+    every_turn: bool = Field(default=False, description="of a node that turns: at this angle of each turn, not once")
 
 
 class BumpParams(NamedTuple):

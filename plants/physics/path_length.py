@@ -34,8 +34,8 @@ class PathLengthSettings(Settings):
     node: Node
     excess: float = quantity(unit="m", ge=-1, le=1, help="length beyond that of a limp tape at the tension F_t")
     F_t: float = quantity(0.1, unit="N", gt=0, le=1e4, help="tension at which the length was set")
-    power: float = quantity(0.5, unit="", gt=0, le=4, help="of the tension; 1/2 for a strip round small guides")
-    least: float = quantity(0.005, unit="N", gt=0, le=1e4, help="tension below which the tape hangs as it does there")
+    power: float = quantity(0.5, unit="", gt=0, le=4, help="exponent of the tension; 1/2 for small guides")
+    least: float = quantity(0.005, unit="N", gt=0, le=1e4, help="tension below which the length is constant")
 
 
 class PathLengthParams(NamedTuple):

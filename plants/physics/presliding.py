@@ -36,13 +36,13 @@ class PreslidingSettings(Settings):
 
     term: Literal["friction.presliding"] = "friction.presliding"
     node: Node
-    z_s: float = quantity(unit="", ge=0, le=1.0, help="travel on the bristles before it slides, rad or m by node")
+    z_s: float = quantity(unit="", ge=0, le=1.0, help="travel on the bristles before sliding, rad or m by node")
     form: Literal["dahl", "lugre"] = Field(
-        default="dahl", description="of the bristles; lugre has damping and a rise at standstill besides"
+        default="dahl", description="law of the bristles; lugre adds damping and a rise at standstill"
     )
     tau_s: float = quantity(3e-3, unit="s", ge=0, le=1.0, help="damping of the bristles over their stiffness; lugre")
-    rise: float = quantity(0.0, unit="", ge=0, le=10, help="share by which it is stiffer to start than to keep; lugre")
-    v_s: float = quantity(1.0, unit="", gt=0, le=1e3, help="Stribeck speed of that, rad/s or m/s by node")
+    rise: float = quantity(0.0, unit="", ge=0, le=10, help="share by which breakaway exceeds sliding friction; lugre")
+    v_s: float = quantity(1.0, unit="", gt=0, le=1e3, help="Stribeck speed of the rise, rad/s or m/s by node")
 
 
 class PreslidingParams(NamedTuple):

@@ -33,10 +33,10 @@ class CoggingSettings(Settings):
     phi: float = quantity(0.0, unit="rad", ge=-100, le=100, help="phase at angle 0")
     per_turn: float = quantity(1.0, unit="", gt=0, le=1e4, help="teeth in one turn")
     A2: float = quantity(0.0, unit="", ge=-1e4, le=1e4, help="amplitude of the second harmonic")
-    phi2: float = quantity(0.0, unit="rad", ge=-100, le=100, help="its phase")
+    phi2: float = quantity(0.0, unit="rad", ge=-100, le=100, help="phase of the second harmonic")
     A3: float = quantity(0.0, unit="", ge=-1e4, le=1e4, help="amplitude of the third harmonic")
-    phi3: float = quantity(0.0, unit="rad", ge=-100, le=100, help="its phase")
-    turn: float = quantity(TURN, unit="", gt=0, le=1e3, help="way of one turn: 2 pi, or the pitch in m where it slides")
+    phi3: float = quantity(0.0, unit="rad", ge=-100, le=100, help="phase of the third harmonic")
+    turn: float = quantity(TURN, unit="", gt=0, le=1e3, help="travel of one turn: 2 pi, or a pitch in m of a slide")
 
 
 class CoggingParams(NamedTuple):
@@ -77,11 +77,13 @@ class EncoderSettings(Settings):
     A2: float = quantity(
         0.0, unit="", ge=-10, le=10, help="amplitude of the second harmonic: an oval, or a tilted disc"
     )
-    phi2: float = quantity(0.0, unit="rad", ge=-100, le=100, help="its phase")
+    phi2: float = quantity(0.0, unit="rad", ge=-100, le=100, help="phase of the second harmonic")
     A3: float = quantity(0.0, unit="", ge=-10, le=10, help="amplitude of the third harmonic")
-    phi3: float = quantity(0.0, unit="rad", ge=-100, le=100, help="its phase")
-    order: float = quantity(1.0, unit="", gt=0, le=1e5, help="times a turn; number of lines for an error of division")
-    turn: float = quantity(TURN, unit="", gt=0, le=1e3, help="way of one turn: 2 pi, or that in m where it slides")
+    phi3: float = quantity(0.0, unit="rad", ge=-100, le=100, help="phase of the third harmonic")
+    order: float = quantity(
+        1.0, unit="", gt=0, le=1e5, help="periods in one turn; number of lines for a division error"
+    )
+    turn: float = quantity(TURN, unit="", gt=0, le=1e3, help="travel of one turn: 2 pi, or a pitch in m of a slide")
 
 
 class EncoderParams(NamedTuple):

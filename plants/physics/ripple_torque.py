@@ -26,10 +26,10 @@ class TorqueSettings(Settings):
     phi: float = quantity(0.0, unit="rad", ge=-100, le=100, help="phase at angle 0")
     per_turn: float = quantity(6.0, unit="", gt=0, le=1e4, help="periods in one turn: six times the pole pairs")
     A2: float = quantity(0.0, unit="", ge=-0.95, le=0.95, help="amplitude of the second harmonic")
-    phi2: float = quantity(0.0, unit="rad", ge=-100, le=100, help="its phase")
+    phi2: float = quantity(0.0, unit="rad", ge=-100, le=100, help="phase of the second harmonic")
     A3: float = quantity(0.0, unit="", ge=-0.95, le=0.95, help="amplitude of the third harmonic")
-    phi3: float = quantity(0.0, unit="rad", ge=-100, le=100, help="its phase")
-    turn: float = quantity(TURN, unit="", gt=0, le=1e3, help="way of one turn: 2 pi, or that in m where it slides")
+    phi3: float = quantity(0.0, unit="rad", ge=-100, le=100, help="phase of the third harmonic")
+    turn: float = quantity(TURN, unit="", gt=0, le=1e3, help="travel of one turn: 2 pi, or a pitch in m of a slide")
 
 
 class TorqueParams(NamedTuple):

@@ -36,8 +36,8 @@ class MissedCountsSettings(Settings):
     over: float = quantity(1e-3, unit="s", gt=0, le=10, help="time that a jump takes")
     each: float = quantity(0.0, unit="", ge=-10, le=10, help="jump at each passage of the mark, rad or m")
     way: Literal["forward", "backward"] = Field(default="forward", description="direction in which the mark is passed")
-    mark: float = quantity(0.0, unit="", ge=-100, le=100, help="where the mark is, rad or m")
-    turn: float = quantity(2.0 * math.pi, unit="", gt=0, le=1e3, help="way from mark to mark, rad or m")
+    mark: float = quantity(0.0, unit="", ge=-100, le=100, help="position of the mark, rad or m")
+    turn: float = quantity(2.0 * math.pi, unit="", gt=0, le=1e3, help="travel from mark to mark, rad or m")
 
     @model_validator(mode="after")
     def _fits(self) -> "MissedCountsSettings":
@@ -141,7 +141,7 @@ class ScaleSettings(Settings):
 
     term: Literal["sensor.scale"] = "sensor.scale"
     node: Node
-    relative: float = quantity(unit="", ge=-0.9, le=10, help="the reading is 1 + relative times too large")
+    relative: float = quantity(unit="", ge=-0.9, le=10, help="share by which the reading is too large")
 
 
 class ScaleParams(NamedTuple):

@@ -29,8 +29,8 @@ class SensorLagSettings(Settings):
 
     term: Literal["sensor.lag"] = "sensor.lag"
     node: Node
-    tau: float = quantity(unit="s", ge=0, le=10, help="how late it shows a steady motion")
-    order: Literal[1, 2] = Field(default=1, description="of the filter")
+    tau: float = quantity(unit="s", ge=0, le=10, help="delay of the reading of a steady motion")
+    order: Literal[1, 2] = Field(default=1, description="order of the filter")
     zeta: float = quantity(1.0, unit="", ge=0.05, le=20, help="damping of order 2")
 
 

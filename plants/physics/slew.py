@@ -24,7 +24,7 @@ class SlewSettings(Settings):
 
     term: Literal["drive.slew"] = "drive.slew"
     node: Node
-    rate: float = quantity(unit="V/s", gt=0, le=1e9, help="the output changes no faster than this")
+    rate: float = quantity(unit="V/s", gt=0, le=1e9, help="largest rate of the output")
     tau: float = quantity(0.0, unit="s", ge=0, le=10, help="time constant of small steps; 0 for a sharp limit")
 
 

@@ -28,9 +28,9 @@ class ViscoelasticSettings(Settings):
     term: Literal["tape.viscoelastic"] = "tape.viscoelastic"
     node: Node
     c_branch: float = quantity(unit="N/m", ge=0, le=1e6, help="stiffness that relaxes")
-    tau: float = quantity(unit="s", gt=0, le=1e4, help="how long it takes to relax")
+    tau: float = quantity(unit="s", gt=0, le=1e4, help="time constant of the relaxation")
     c_branch2: float = quantity(0.0, unit="N/m", ge=0, le=1e6, help="stiffness of a second branch")
-    tau2: float = quantity(1.0, unit="s", gt=0, le=1e4, help="how long that one takes")
+    tau2: float = quantity(1.0, unit="s", gt=0, le=1e4, help="time constant of the second branch")
 
 
 class ViscoelasticParams(NamedTuple):
@@ -80,8 +80,8 @@ class SlackSettings(Settings):
 
     term: Literal["tape.slack"] = "tape.slack"
     node: Node
-    share: float = quantity(1.0, unit="", ge=0, le=1, help="of the push that is missing; 1: the tape cannot push")
-    other: float = quantity(1.0, unit="", ge=0, le=1, help="share of that on the other side of the capstan: one tape")
+    share: float = quantity(1.0, unit="", ge=0, le=1, help="share of the push that is missing; 1: the tape cannot push")
+    other: float = quantity(1.0, unit="", ge=0, le=1, help="factor of share on the other side of the capstan: one tape")
 
 
 class SlackParams(NamedTuple):

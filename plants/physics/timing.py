@@ -30,7 +30,7 @@ class DelaySettings(Settings):
 
     term: Literal["timing.delay"] = "timing.delay"
     node: Node
-    extra: float = quantity(unit="s", ge=0, le=LONGEST, help="delay on top of what the loop is known to have")
+    extra: float = quantity(unit="s", ge=0, le=LONGEST, help="delay on top of the known delay of the loop")
 
 
 class DelayParams(NamedTuple):
@@ -75,7 +75,7 @@ class JitterSettings(Settings):
     node: Node
     sigma: float = quantity(unit="s", ge=0, le=0.01, help="standard deviation of the time of a tick")
     rate: float = quantity(500.0, unit="1/s", gt=0, le=1e5, help="ticks a second")
-    seed: int = Field(default=1, description="of the chance; the same seed, the same times")
+    seed: int = Field(default=1, description="seed of the random times; an equal seed gives equal times")
     form: Literal["gaussian", "uniform"] = Field(default="gaussian", description="distribution of the times")
 
 

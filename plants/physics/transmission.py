@@ -34,11 +34,11 @@ class BacklashSettings(Settings):
 
     term: Literal["transmission.backlash"] = "transmission.backlash"
     node: Node
-    gap: float = quantity(unit="", ge=0, le=1.0, help="total play, rad of the link's first end (m at an axis)")
+    gap: float = quantity(unit="", ge=0, le=1.0, help="total backlash, rad of the link's first end (m at an axis)")
     damping: float = quantity(0.0, unit="", ge=0, le=1, help="share of the link's damping that also acts in the gap")
     edge: float = quantity(0.005, unit="", ge=0, le=1, help="share of half the gap by which its edges are rounded")
     c: float = quantity(
-        0.0, unit="", ge=0, le=1e12, help="stiffness beyond the gap, of a joint that is said to be rigid"
+        0.0, unit="", ge=0, le=1e12, help="stiffness beyond the gap, of a joint that is described as rigid"
     )
 
 

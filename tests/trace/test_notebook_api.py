@@ -77,7 +77,7 @@ def test_the_report_is_shown_in_a_cell_and_saved(answered, tmp_path, monkeypatch
 
 def test_several_recordings_are_of_one_machine_only_where_that_is_said(answered, tmp_path):
     folders = [bundle(tmp_path / name) for name in "ab"]
-    with pytest.raises(rtctl.UserError, match="several recordings are one machine"):
+    with pytest.raises(rtctl.UserError, match="the recordings do not name the same group"):
         rtctl.diagnose(*folders)
     rtctl.diagnose(*folders, together=True, progress=False)
     assert answered == [tuple(folders)]

@@ -44,11 +44,11 @@ def test_the_answer_is_what_the_verdict_says(verdict, d):
 def test_the_parts_that_decide_are_told():
     edges = np.arange(9.0)
     here = Lost("x", 0.0, 30.0, edges, np.array([0.0, 0.0, 10.0, 12.0, 0.5, 0.0, 8.0, 0.0]))
-    assert when(here, 1) == "It loses half of that in the rows from 2 to 4 s."
+    assert when(here, 1) == "Half of the evidence against it is in the rows from 2 to 4 s."
     even = here._replace(nats=np.full(8, 0.01))
     assert "do not decide" in when(even, 1)
     spread = here._replace(nats=np.array([5.0, 0.0, 5.0, 0.0, 5.0, 0.0, 5.0, 0.0]) + np.array([5.0, 0.0] * 4))
-    assert when(spread, 1) == "It loses half of that in the rows from 0 to 1 s and 2 to 3 s."
+    assert when(spread, 1) == "Half of the evidence against it is in the rows from 0 to 1 s and 2 to 3 s."
     assert when(here, 2) == ""
 
 
@@ -59,11 +59,11 @@ def test_neighbours_are_one_run():
 def test_the_report_says_why_the_next_answer_lost():
     page = html(unnamed())
     assert "The next likeliest answer is" in page
-    assert "What each part of the recording says for the answer" in page
+    assert "Gain in log probability of the answer over the next likeliest one" in page
 
 
 def test_nothing_is_drawn_where_no_part_says_anything():
     assert not lost_by(named()).nats.any()
     page = html(named())
-    assert "The rows do not decide between them" in page
+    assert "The rows do not decide between the two" in page
     assert "What each part of the recording says for the answer" not in page

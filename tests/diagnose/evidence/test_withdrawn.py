@@ -26,7 +26,7 @@ def test_an_effect_whose_size_may_be_zero_is_not_told():
     heldout, _ = predict(base, more)
     decided, again, _ = told(d.decided._replace(best=more), heldout, d.found)
     assert decided.best.names == best.names == again.fits[1].names
-    assert decided.why == "without drive.offset:amplifier, all is predicted as well"
+    assert decided.why == "without drive.offset:amplifier, the held-out rows are predicted as well"
 
 
 def test_what_stands_beside_an_idle_effect_alone_is_not_told():
@@ -41,4 +41,4 @@ def test_what_stands_beside_an_idle_effect_alone_is_not_told():
     assert decided.verdict == NOTHING
     assert decided.best is predictor is base
     assert again.fits[1].names == ()
-    assert "alone, whose size may be zero" in decided.why
+    assert "whose size may be zero" in decided.why
