@@ -197,7 +197,7 @@ def test_a_loop_that_still_runs_is_waited_for_and_then_refused(tmp_path: Path, m
 
 @pytest.mark.parametrize("name", ["../ivu", "*", ""])
 def test_a_name_is_no_path(name: str) -> None:
-    with pytest.raises(UserError, match="is no machine's name"):
+    with pytest.raises(UserError, match="is no name of a machine"):
         recover(name)
 
 
