@@ -42,7 +42,7 @@ class MissedCountsSettings(Settings):
     @model_validator(mode="after")
     def _fits(self) -> "MissedCountsSettings":
         if len(self.more) >= MOST:
-            raise ValueError(f"more: {len(self.more)} further jumps are too many; {MOST - 1} is the most")
+            raise ValueError(f"more: {len(self.more)} further jumps are too many; use at most {MOST - 1}")
         return self
 
 

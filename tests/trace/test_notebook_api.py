@@ -97,7 +97,7 @@ def test_a_bar_in_a_notebook_that_moves_and_goes(monkeypatch):
     monkeypatch.setattr(api_progress, "_notebook", lambda: display)
     with api_progress.stages(True) as stage:
         stage("screening every <hypothesis>")
-        stage("predicting rows that were not fitted")
+        stage("predicting the held-out rows")
     assert "every &lt;hypothesis&gt;" in shown[0] and "<progress value='0." in shown[0]
     assert shown[-1] == ""
 

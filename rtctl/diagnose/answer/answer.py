@@ -161,7 +161,7 @@ def diagnose_record(*records: GraphRecord, progress: Progress = lambda _: None) 
         found = search(likelier(like, space), space, progress)
         other = suits(found.best)
         if other is not None:
-            progress("fitting with the other shape of the command between its samples")
+            progress("changing the shape of the command between its samples")
             found = search(other, space, progress)
         progress("comparing named effects with wrong numbers and forces without a name")
         found = found._replace(doubts=doubted(found))

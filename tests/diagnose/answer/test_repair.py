@@ -210,7 +210,7 @@ def test_the_experiment_on_our_own_machine_is_its_config(config):
     own = config("axis", set={"law.limit.high": 6.0}).model_dump(mode="json", exclude_unset=True)
     file = text(small(AXIS, AXIS, EXPERIMENT), own)
     settings = CONFIGS["axis"].model_validate(yaml.safe_load(file))
-    assert "not ours" not in file
+    assert "stands in for the recorded" not in file
     assert settings.law.limit.high == 6.0 and settings.name == own["name"]
 
 

@@ -66,4 +66,4 @@ def test_nothing_is_drawn_where_no_part_says_anything():
     assert not lost_by(named()).nats.any()
     page = html(named())
     assert "The rows do not decide between the two" in page
-    assert "What each part of the recording says for the answer" not in page
+    assert "Gain in log probability of the answer over the next likeliest one" not in page

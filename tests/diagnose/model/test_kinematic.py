@@ -65,5 +65,5 @@ def test_values_that_the_program_took_are_not_told():
 
 def test_one_position_is_not_enough():
     case = case_of(SCREW, RATE, problem="kinematic")
-    with pytest.raises(NoAnswer, match="compares two positions at least"):
+    with pytest.raises(NoAnswer, match="needs at least two positions"):
         record(case, turn=TURN)
