@@ -123,10 +123,10 @@ def repair(
     try:
         again = diagnose(bundle, second, progress=progress)
     except (NoAnswer, UserError) as error:
-        progress(f"the experiment says nothing: {error}")
+        progress(f"the experiment supports no verdict: {error}")
         return Repair((bundle, second), (first,), tuple(trips))
     if trips[-1] and again.verdict != "named":
-        progress(f"the experiment ended with a trip ({trips[-1]}) and names nothing; the first diagnosis stands")
+        progress(f"the experiment ended with a trip ({trips[-1]}) and gave no name; the first diagnosis is kept")
         return Repair((bundle, second), (first,), tuple(trips))
     return Repair((bundle, second), (first, again), tuple(trips))
 
