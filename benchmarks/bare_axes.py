@@ -141,7 +141,7 @@ def judged(hidden: dict[str, tuple[str, ...]], out: Path) -> dict[str, Any]:
 
 def told(found: dict[str, Any]) -> list[str]:
     """Result as lines of text."""
-    return [f"{found['right']} of {found['cases']} right, {found['ambiguous_with_it']} more ambiguous with all of it"]
+    return [f"{found['right']} of {found['cases']} right, {found['ambiguous_with_it']} more ambiguous with all effects"]
 
 
 if __name__ == "__main__":

@@ -89,7 +89,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     parser.add_argument("--runs", type=int, default=4000, help="runs of a window")
-    parser.add_argument("--windows", type=int, default=5, help="windows of either cluster, in turns")
+    parser.add_argument("--windows", type=int, default=5, help="windows of each cluster, alternately")
     given = parser.parse_args()
     try:
         import distributed  # noqa: F401

@@ -26,8 +26,8 @@ import numpy as np
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 SHARES = {"p50": 0.5, "p99": 0.99, "p999": 0.999}
-EDGE = 0.1  # s left out at either end of a window: transition between commands and none
-START = 180.0  # s; a cold cache compiles
+EDGE = 0.1  # s, excluded at each end of a window: commands start or stop there
+START = 180.0  # s, time limit of the start; an empty cache compiles
 
 
 class Window(NamedTuple):
@@ -159,7 +159,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     parser.add_argument("--machine", choices=("ldu", "ivu"), default="ldu")
-    parser.add_argument("--seconds", type=float, default=60.0, help="with commands; as many go by without")
+    parser.add_argument("--seconds", type=float, default=60.0, help="duration with commands, and without, s")
     parser.add_argument("--window", type=float, default=2.5, help="length of a window, s")
     parser.add_argument("--rate", type=float, default=1000.0, help="commands a second")
     given = parser.parse_args()
@@ -175,7 +175,7 @@ def main() -> int:
     if given.json:
         print(json.dumps(result))
         return 0
-    for key, title in (("with_us", "with commands, us"), ("without_us", "without, us"), ("ratio", "ratio")):
+    for key, title in (("with_us", "with commands, us"), ("without_us", "without commands, us"), ("ratio", "ratio")):
         print(f"{title:20}" + "  ".join(f"{name} {result[key][name]:8.2f}" for name in SHARES))
     print(f"{result['commands']} commands, {result['commands_per_s']:g} a second, {result['answered']} answered, "
           f"{result['refused']} refused; missed {result['missed']} of {result['ticks']} ticks")  # fmt: skip

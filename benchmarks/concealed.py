@@ -42,7 +42,7 @@ def run(
     parser.add_argument("--count", type=int, default=count)
     parser.add_argument("--seed", type=int, default=seed)
     parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--out", type=Path, help="keep cases and diagnoses here")
+    parser.add_argument("--out", type=Path, help="folder that keeps cases and diagnoses")
     parser.add_argument("--json", action="store_true")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="rtb-", dir="/tmp") as name:

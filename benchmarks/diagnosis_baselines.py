@@ -106,9 +106,9 @@ def _cell(key: str, value: float | None) -> str:
 def main(argv: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path, help="bundles with answers.json")
-    parser.add_argument("--out", type=Path, help="where the diagnoses go; a folder that is deleted if absent")
+    parser.add_argument("--out", type=Path, help="folder of the diagnoses; default: a temporary folder")
     parser.add_argument("--only", nargs="+", choices=tuple(METHODS), default=list(METHODS))
-    parser.add_argument("--cases", type=int, help="the first N only")
+    parser.add_argument("--cases", type=int, help="number of cases; default: all")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     given = parser.parse_args(argv)
     try:

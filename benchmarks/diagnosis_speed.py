@@ -91,7 +91,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     parser.add_argument("--machine", choices=(*MACHINES, "both"), default="both")
-    parser.add_argument("--plain", action="store_true", help="with nothing missing")
+    parser.add_argument("--plain", action="store_true", help="recordings without missing physics")
     given = parser.parse_args()
     machines = tuple(MACHINES) if given.machine == "both" else (given.machine,)
     result = {machine: diagnosed(machine, given.plain) for machine in machines}

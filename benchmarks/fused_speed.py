@@ -125,9 +125,9 @@ def agree(kind: str, ours: Any, c: Any, ticks: int) -> dict[str, Any]:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", action="store_true", help="print one JSON object")
-    parser.add_argument("--seconds", type=float, help="virtual time of a run; the whole reference if not given")
-    parser.add_argument("--windows", type=int, default=9, help="windows of ours and of C, in turns")
-    parser.add_argument("--machine", choices=sorted(VIRTUAL), action="append", help="only this one")
+    parser.add_argument("--seconds", type=float, help="virtual time of a run, s; default: the whole reference")
+    parser.add_argument("--windows", type=int, default=9, help="windows of rtctl and of C, alternately")
+    parser.add_argument("--machine", choices=sorted(VIRTUAL), action="append", help="only this machine")
     parser.add_argument("--described", metavar="NAME", action="append", help="a described machine, such as belt")
     given = parser.parse_args()
     if given.described:
@@ -143,7 +143,7 @@ def main() -> int:
             )
         return 0
     if shutil.which("cc") is None:
-        message = "there is no C compiler (cc) here to compare with; install gcc"
+        message = "no C compiler (cc) was found for the comparison; install gcc"
         print(json.dumps({"skipped": message}) if given.json else message)
         return 3
     os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})

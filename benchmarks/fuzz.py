@@ -57,10 +57,10 @@ def main() -> int:
 
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", action="store_true", help="print one JSON object")
-    parser.add_argument("--inputs", type=int, default=1_000_000, help="over all targets")
+    parser.add_argument("--inputs", type=int, default=1_000_000, help="number of inputs of all targets together")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--target", action="append", choices=list(TARGETS), help="this one; may be given again")
-    parser.add_argument("--patience", type=float, default=5.0, help="s that one input may take")
+    parser.add_argument("--target", action="append", choices=list(TARGETS), help="only this target; may be repeated")
+    parser.add_argument("--patience", type=float, default=5.0, help="time limit of one input, s")
     given = parser.parse_args()
     result = fuzz(given.inputs, given.target or list(TARGETS), given.seed, given.patience, not given.json)
     if given.json:

@@ -36,9 +36,11 @@ def main() -> None:
     parser.add_argument("--machines", type=int, default=60)
     parser.add_argument("--seed", type=int, default=71)
     parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--out", type=Path, help="keep recordings, diagnoses and results here")
+    parser.add_argument("--out", type=Path, help="folder that keeps recordings, diagnoses and results")
     parser.add_argument(
-        "--known", action="store_true", help="the effect is told, none is diagnosed: the remedies alone"
+        "--known",
+        action="store_true",
+        help="only the remedies: the model has the true effect, no diagnosis",
     )
     parser.add_argument("--json", action="store_true")
     given = parser.parse_args()

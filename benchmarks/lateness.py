@@ -25,7 +25,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from rtctl.doctor.cyclictest import LONGEST_NS, SHARES, counted  # noqa: F401, peers.py takes it from here
+from rtctl.doctor.cyclictest import LONGEST_NS, SHARES, counted  # noqa: F401, peers.py imports `counted` from here
 from rtctl.doctor.cyclictest import missing as why_no_cyclictest
 from rtctl.doctor.cyclictest import run as run_cyclictest
 
@@ -172,7 +172,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     parser.add_argument("--machine", choices=sorted(RATES), default="ldu")
-    parser.add_argument("--rate", type=float, help="Hz; that of the shipped config if not given")
+    parser.add_argument("--rate", type=float, help="rate in Hz; default: that of the shipped config")
     parser.add_argument("--seconds", type=float, default=5.0, help="length of a window, whole seconds for cyclictest")
     parser.add_argument("--rounds", type=int, default=5)
     given = parser.parse_args()

@@ -149,9 +149,9 @@ def report(result: dict[str, Any]) -> str:
         if name in result:
             lines.append(f"  {name:32s}" + "".join(f"{result[name]['lateness_us'][n]:9.2f}" for n in SHARES))
     for peer, found in result["lateness_ratio"].items():
-        lines.append(f"  {'ours over ' + peer:32s}" + "".join(f"{found[n]:9.2f}" for n in SHARES))
+        lines.append(f"  {'rtctl over ' + peer:32s}" + "".join(f"{found[n]:9.2f}" for n in SHARES))
     lines.append(f"CPU of a tick, ns{'':17s}" + "".join(f"{n:>9s}" for n in ("middle", *SHARES)))
-    rows = {"two pd and a low_pass, ours": result["ours"]["law_ns"]}
+    rows = {"two pd and a low_pass, rtctl": result["ours"]["law_ns"]}
     if "hal" in result:
         rows["two pid and a lowpass, hal"] = result["hal"]["law_ns"]
         rows["hal's whole thread"] = result["hal"]["thread_ns"]
@@ -170,7 +170,7 @@ def report(result: dict[str, Any]) -> str:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", action="store_true", help="print one JSON object")
-    parser.add_argument("--rate", type=float, default=10_000.0, help="Hz of all windows")
+    parser.add_argument("--rate", type=float, default=10_000.0, help="rate of all windows, Hz")
     parser.add_argument("--seconds", type=float, default=2.0, help="length of a window, whole seconds for cyclictest")
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--stress", action="store_true", help="under load: every CPU busy, viewers, clients")

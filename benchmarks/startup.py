@@ -70,7 +70,7 @@ def main() -> int:
     parser.add_argument("--machine", choices=("ivu", "ldu"), default="ivu")
     parser.add_argument("--link", choices=("zmq", "shm"), default="zmq")
     parser.add_argument("--repeats", type=int, default=5)
-    parser.add_argument("--cold", action="store_true", help="once more, with everything to compile")
+    parser.add_argument("--cold", action="store_true", help="also measure a start with an empty cache")
     given = parser.parse_args()
     result: dict[str, Any] = {"machine": given.machine, "link": given.link}
     with tempfile.TemporaryDirectory(prefix="rtb-", dir="/tmp") as folder:
@@ -90,9 +90,9 @@ def main() -> int:
     else:
         print(f"{given.machine} over {given.link}: {result['warm_s']:.2f} s from the command to the first tick")
         if given.cold:
-            print(f"with everything to compile {result['cold_s']:.1f} s")
+            print(f"with an empty cache {result['cold_s']:.1f} s")
             alone, after = result["another_cold_s"], result["another_after_first_s"]
-            print(f"over the other link {alone:.1f} s, with the steps of the first {after:.1f} s")
+            print(f"over the other link {alone:.1f} s, with the compiled steps of the first run {after:.1f} s")
     return 0
 
 

@@ -149,9 +149,9 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     parser.add_argument("--records", type=int, default=1000, help="recordings of the trend")
-    parser.add_argument("--scaled", type=int, default=200, help="of them, those that are computed on Dask workers")
+    parser.add_argument("--scaled", type=int, default=200, help="number of recordings that Dask workers compute")
     parser.add_argument("--seconds", type=float, default=10.0, help="length of a recording")
-    parser.add_argument("--windows", type=int, default=3, help="windows of either cluster, in turns")
+    parser.add_argument("--windows", type=int, default=3, help="windows of each cluster, alternately")
     given = parser.parse_args()
     try:
         import distributed  # noqa: F401

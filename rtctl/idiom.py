@@ -1,13 +1,13 @@
-"""The one idiom that everything in the tick shares: settings, params, state, build, step.
+"""Idiom of all code in the tick: settings, params, state, build, step.
 
-    class PdSettings(Settings)       what a person writes in YAML, in the unit of their choice
-    class PdParams(NamedTuple)       what the tick needs: coefficients for this dt
-    PD_STATE = state(e=float)        what it remembers from tick to tick
-    def build(settings, dt)          the only road from the first to the second
-    @tick def step(p, s, ...)        one expression of the law or the physics, compiled
+    class PdSettings(Settings)       settings in YAML, in any unit of the right dimension
+    class PdParams(NamedTuple)       coefficients of the tick for this dt
+    PD_STATE = state(e=float)        memory from tick to tick
+    def build(settings, dt)          params from settings
+    @tick def step(p, s, ...)        law or physics of one tick, compiled
 
-In the running tick `p` and `s` are records inside shared memory; in a test they may as well be the
-named tuple itself and `np.zeros(1, PD_STATE)[0]`: compiled code reads `p.gain` from either.
+In the running tick `p` and `s` are records in shared memory. In a test `p` may be the named tuple, and `s` be
+`np.zeros(1, PD_STATE)[0]`: compiled code reads `p.gain` from a record or a named tuple.
 """
 
 import threading
@@ -32,22 +32,22 @@ INNER: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 
 def tick(function: Callable[..., Any]) -> Any:
-    """Compile a step. It is kept, as the generated module that calls it is, under a name made of all sources.
+    """Compiled step, cached under a hash of all sources, like the generated module that calls the step.
 
-    IEEE arithmetic in program order (no fastmath, no contraction), so that the same step gives the same bits in
-    whatever module it is compiled; division by zero gives inf instead of raising, since nobody could catch it.
+    IEEE arithmetic in program order (no fastmath, no contraction): a step gives equal bits in each module that compiles
+    it. Division by zero gives inf and does not raise: a tick cannot catch an exception.
     """
     return Step(function)
 
 
 def glue(function: Callable[..., Any]) -> Any:
-    """As `tick`, for generated code: numba counts no references in it, so that whatever would take memory from the heap
-    does not compile."""
+    """Compiled step of generated code, without reference counting: code that takes memory from the heap does not
+    compile."""
     return Step(function, _nrt=False)
 
 
 class _Interpreter(threading.local):
-    runs = False  # whether steps that are called in this thread are to be interpreted
+    runs = False  # whether the steps called in this thread are interpreted
 
 
 INTERPRETER = _Interpreter()
@@ -55,7 +55,7 @@ INTERPRETER = _Interpreter()
 
 @contextmanager
 def interpreted() -> Iterator[None]:
-    """Steps that are called within are interpreted, in this thread: see `Step.interpret`."""
+    """Context in which the steps of this thread are interpreted; see `Step.interpret`."""
     before, INTERPRETER.runs = INTERPRETER.runs, True
     try:
         with np.errstate(all="ignore"):  # as in compiled code: counters of random numbers wrap around
@@ -65,11 +65,11 @@ def interpreted() -> Iterator[None]:
 
 
 class Step:
-    """A function compiled twice, each when it is first asked for: as compiled code calls it, and as Python does.
+    """Function compiled on first use, once for calls from compiled code and once for calls from Python.
 
-    What only compiled code calls needs no wrappers that unpack Python objects. A tick is made of a hundred steps, and
-    their wrappers, which nobody calls, would be more than a third of the time that it takes to compile. What Python
-    calls a few times only is not worth compiling at all: see `interpret`.
+    A step that only compiled code calls needs no wrapper that unpacks Python objects. The wrappers of the hundred steps
+    of a tick would take more than a third of the compilation time. A step that Python calls a few times is interpreted;
+    see `interpret`.
     """
 
     def __init__(self, function: Callable[..., Any], **options: Any):
@@ -78,13 +78,13 @@ class Step:
         self._inner = njit(**OPTIONS, **INNER, **options)(function)
         self._outer = njit(**OPTIONS, **options)(function)
         self._inner._cache, self._outer._cache = StepCache(function, "inner"), StepCache(function, "outer")
-        self._numba_type_ = typeof(self._inner)  # what a name stands for in compiled code
+        self._numba_type_ = typeof(self._inner)  # type of the name in compiled code
 
     def __call__(self, *arguments: Any) -> Any:
         return (self.py_func if INTERPRETER.runs else self._outer)(*arguments)
 
     def interpret(self, *arguments: Any) -> Any:
-        """The same bits from Python's interpreter, in this step and in those it calls, with nothing compiled.
+        """Result of the step, to the bit, from Python's interpreter: this step and the steps that it calls.
 
         Params are named tuples and states records of a recarray, whose fields Python can read.
         """
@@ -92,21 +92,21 @@ class Step:
             return self.py_func(*arguments)
 
     def compile(self, types: tuple[Any, ...]) -> None:
-        """Compile for arguments of these types, for compiled code."""
+        """Compile for calls from compiled code with arguments of these types."""
         self._inner.compile(types)
 
     def inspect_llvm(self) -> dict[Any, str]:
-        """Optimised code for compiled code, by types."""
+        """Optimised code for calls from compiled code, by argument types."""
         return dict(self._inner.inspect_llvm())
 
     @property
     def overloads(self) -> dict[Any, Any]:
-        """What was compiled for compiled code, by types."""
+        """Compiled overloads for calls from compiled code, by argument types."""
         return dict(self._inner.overloads)
 
 
 class Settings(BaseModel):
-    """What a person writes in YAML. SI units or a string with a unit; an unknown key is an error."""
+    """Settings in YAML: numbers in SI, or strings with a unit. An unknown key is an error."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, validate_default=False, allow_inf_nan=False)
 
@@ -115,27 +115,27 @@ def quantity(
     default: Any = ..., *, unit: str, help: str, safer: str = "", off: float | None = None, absent: str = "",
     **bounds: Any,
 ) -> Any:  # fmt: skip
-    """A setting with its unit and one line of help, both shown by `rtctl schema`.
+    """Field of a setting with its unit and one line of help; `rtctl schema` shows both.
 
-    A number is taken as SI; a string may carry any unit of the same dimension ("160 ms", "2.4 mNm"). `safer`, "smaller"
-    or "larger", keeps a running machine from the other direction (rtctl/config/bounds.py); `off` is the value that
-    switches the limit off, `absent` the setting whose negative is meant where this one is None.
+    A number is SI; a string may have any unit of the dimension ("160 ms", "2.4 mNm"). `safer` is the direction,
+    "smaller" or "larger", in which a running machine accepts values beyond the start value (rtctl/config/bounds.py).
+    `off` is the value that switches the limit off. `absent` is the setting whose negative replaces a value of None.
     """
     words: dict[str, Any] = {"unit": unit, **guard(safer, off)} if safer else {"unit": unit}
     words |= {"absent": absent} if absent else {}
     field = Field(default, description=help, json_schema_extra=words, **bounds)
     assert isinstance(field, FieldInfo)
-    field.metadata.append(BeforeValidator(lambda value: to_si(value, unit)))  # last: it runs first
+    field.metadata.append(BeforeValidator(lambda value: to_si(value, unit)))  # the last validator runs first
     return field
 
 
 def guard(safer: str, off: float | None = None) -> dict[str, Any]:
-    """What a field says in `json_schema_extra` of its safer direction; see `quantity`."""
+    """Part of `json_schema_extra` with the safer direction of a field; see `quantity`."""
     return {"safer": safer} if off is None else {"safer": safer, "off": off}
 
 
 def state(**fields: Any) -> np.dtype:
-    """A state record: `state(e=float, n=int, x=(float, 4), pd=PD_STATE)`. float is f8, int is i8."""
+    """Dtype of a state record: `state(e=float, n=int, x=(float, 4), pd=PD_STATE)`. float is f8, int is i8."""
     return np.dtype([_field(name, kind) for name, kind in fields.items()], align=True)
 
 
@@ -150,7 +150,7 @@ def _scalar(kind: Any) -> Any:
 
 
 def record_dtype(params: Any) -> np.dtype:
-    """The record that holds a params tuple in shared memory, nested tuples and arrays included."""
+    """Dtype of the record of a params tuple in shared memory, with nested tuples and arrays."""
     fields: list[tuple] = []
     for name in params._fields:
         value = getattr(params, name)

@@ -50,7 +50,7 @@ BACK_EMF = Term(
     stands=(stand("drive", "general current"), stand("drive", "general force")),
     look_alikes={
         "friction.viscous": "run out with the drive switched off: friction still brakes, back-EMF does not",
-        "friction.quadratic": "hold one, two and three speeds: back-EMF grows in proportion",
+        "friction.quadratic": "hold one, two and three speeds: back-EMF grows in proportion to speed",
         "drive.saturation": "a stalled start and a fast run: back-EMF takes nothing away at standstill",
     },
     typical={"b": (0.1, 1.0)},

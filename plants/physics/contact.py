@@ -41,7 +41,7 @@ class SlipSettings(Settings):
 
     term: Literal["transmission.slip"] = "transmission.slip"
     node: Node
-    F_max: float = quantity(unit="", gt=0, le=1e6, help="what the contact carries, N (Nm of the motor at a wheel)")
+    F_max: float = quantity(unit="", gt=0, le=1e6, help="largest force of the contact, N (Nm of the motor at a wheel)")
     eta: float = quantity(
         0.0, unit="", ge=0, le=1e9, help="force beyond F_max per sliding speed, N s/m (Nm s/rad at a wheel)"
     )
@@ -54,11 +54,11 @@ class CreepSettings(Settings):
     term: Literal["transmission.creep"] = "transmission.creep"
     node: Node
     kappa: float = quantity(
-        0.0, unit="", ge=0, le=1e3, help="way lost per way and force, 1/N (1/Nm of the motor at a wheel)"
+        0.0, unit="", ge=0, le=1e3, help="share of travel lost per force, 1/N (1/Nm of the motor at a wheel)"
     )
     R_c: float = quantity(3e-3, unit="m", gt=0, help="radius of the LDU's capstan, where the strip creeps")
     rate: float = quantity(
-        0.0, unit="", ge=0, le=1e6, help="way lost per second and force, at a joint of a described machine"
+        0.0, unit="", ge=0, le=1e6, help="travel lost per second and force, at a joint of a described machine"
     )
 
 
@@ -276,10 +276,10 @@ SLIP = Term(
     moves=True,
     stands=(stand("joint", "contact"), stand("joint", "general spring", usual=False)),
     look_alikes={
-        "transmission.creep": "one way, softly and hard: creep is lost both times, slip only when hard",
-        "sensor.missed_counts": "hard acceleration at low top speed: counts go at speed, slip at force",
+        "transmission.creep": "one direction, softly and hard: creep loses travel in both, slip only in the hard one",
+        "sensor.missed_counts": "hard acceleration at low top speed: counts are lost by speed, slip comes by force",
         "drive.saturation": "read both sides of the contact: a drive that clips moves both alike",
-        "sensor.scale": "a long gentle move: a wrong scale errs by the way, slip not at all",
+        "sensor.scale": "a long gentle move: the error of a wrong scale grows with distance, slip gives no error",
     },
     typical={"F_max": (0.5, 0.9)},
     scale={"F_max": "contact"},
@@ -293,7 +293,7 @@ SLIP = Term(
         need="hard acceleration, with a sensor behind the contact",
     ),
     check=(
-        "Mark both sides of the contact and see whether the marks part in hard acceleration; look at "
+        "Mark both sides of the contact and see whether they move apart in hard acceleration; look at "
         "its pressure, oil and wear."
     ),
     units={"F_max": "force", "eta": "drag"},
@@ -327,10 +327,10 @@ CREEP = Term(
         stand("joint", "general spring", usual=False, ways=(BY_WAY, (Size("rate", "yield", 0.001),))),
     ),
     look_alikes={
-        "sensor.scale": "out with load and back without: a wrong scale errs the same both ways, creep by the load",
-        "transmission.slip": "a gentle long move under load: slip needs a peak, creep only way",
+        "sensor.scale": "out with load and back without: a wrong scale gives equal errors, creep an error by load",
+        "transmission.slip": "a gentle long move under load: creep grows with distance, slip needs a peak of force",
         "sensor.missed_counts": "hold the speed and raise the load: creep grows, lost counts do not",
-        "geometry.radius_change": "turn back to where it began: radii come back, what crept does not",
+        "geometry.radius_change": "turn back to the start: radii come back, creep does not",
     },
     typical={"kappa": (1e-3, 0.5)},
     axis="tension",
@@ -340,11 +340,11 @@ CREEP = Term(
     phrase=Phrase(
         noun="creep",
         head="the contact at {here} creeps",
-        detail="it loses {kappa} of the way by load",
+        detail="it loses {kappa} of the travel under load",
         need=BEHIND,
     ),
     check=(
-        "Mark both sides of the contact and see whether the marks part over a long gentle move; look at its pressure."
+        "Mark both sides of the contact and see whether they move apart in a long gentle move; look at its pressure."
     ),
     units={"kappa": "per_force", "rate": "yield"},
     search=BY_WAY,

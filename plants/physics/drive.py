@@ -28,7 +28,7 @@ class OffsetSettings(Settings):
 
     term: Literal["drive.offset"] = "drive.offset"
     node: Node
-    offset: float = quantity(unit="V", ge=-10, le=10, help="what stands at the driver when nothing is asked for")
+    offset: float = quantity(unit="V", ge=-10, le=10, help="input of the driver at a command of zero")
 
 
 class OffsetParams(NamedTuple):
@@ -57,7 +57,7 @@ class DeadbandSettings(Settings):
     node: Node
     band: float = quantity(unit="V", ge=0, le=5, help="half width of the dead zone")
     form: Literal["shift", "cut", "floor"] = Field(
-        default="shift", description="beyond the band: from zero on, a jump to the command, or +-band within it too"
+        default="shift", description="output: from zero on beyond the band, a jump to the command, or at least +-band"
     )
     edge: float = quantity(0.1, unit="", ge=0, le=1, help="half width of the jump of `cut`, as a share of band")
 
@@ -120,11 +120,11 @@ class SaturationSettings(Settings):
 
     term: Literal["drive.saturation"] = "drive.saturation"
     node: Node
-    limit: float = quantity(unit="V", gt=0, le=1e3, help="the output gets no further than this")
-    knee: float = quantity(0.0, unit="", ge=0, le=0.9, help="share of the limit at which it starts to bend; 0 is sharp")
-    rise: float = quantity(0.0, unit="s/V", ge=0, le=10, help="time that a change of one volt takes; 0 is at once")
+    limit: float = quantity(unit="V", gt=0, le=1e3, help="largest output")
+    knee: float = quantity(0.0, unit="", ge=0, le=0.9, help="rounding of the limit, as a share of it; 0 is sharp")
+    rise: float = quantity(0.0, unit="s/V", ge=0, le=10, help="time of a change of one volt; 0: no limit")
     form: Literal["parabola", "rapp"] = Field(
-        default="parabola", description="how it bends: over the knee alone, or ever more, u/(1 + (u/limit)^p)^(1/p)"
+        default="parabola", description="rounding: over the knee only, or at all sizes, u/(1 + (u/limit)^p)^(1/p)"
     )
 
 
@@ -187,10 +187,10 @@ class SupplySagSettings(Settings):
     node: Node
     k: float = quantity(unit="", ge=0, le=1, help="share of gain lost per volt, or per volt squared, of all drives")
     form: Literal["current", "power", "drawn"] = Field(
-        default="current", description="what loads the supply: |volts|, their square, or what is left of |volts|"
+        default="current", description="load of the supply: |volts|, their square, or |volts| after the sag"
     )
-    tau: float = quantity(0.0, unit="s", ge=0, le=10, help="time constant of the supply's capacitor; 0: it has none")
-    feeds: Literal["all", "own"] = Field(default="all", description="all drives, or the drive at the node alone")
+    tau: float = quantity(0.0, unit="s", ge=0, le=10, help="time constant of the supply's capacitor; 0: none")
+    feeds: Literal["all", "own"] = Field(default="all", description="drives on the supply: all, or the one at the node")
 
 
 class SupplySagParams(NamedTuple):
@@ -237,7 +237,7 @@ OFFSET = Term(
     act={"command": "{m}.volts[{c}] = drive.offset({p}, {m}.volts[{c}])"},
     stands=(stand("drive"),),
     look_alikes={
-        "friction.asymmetry": "at two places or loads of different friction: an offset stays, asymmetry grows with it",
+        "friction.asymmetry": "at two places or loads of different friction: an offset stays, asymmetry grows",
         "drive.gain_asymmetry": "command at one, two and three times the size: an offset does not grow with it",
         "drive.deadband": "commands of both signs: an offset shifts both the same way, a dead band towards zero",
         "load.spring": "the same short move at both ends of the travel: an offset is the same everywhere",
@@ -250,8 +250,8 @@ OFFSET = Term(
     passive=False,
     phrase=Phrase(
         noun="an offset",
-        head="{here} pushes when nothing is asked for",
-        detail="it gives {offset:+} at a command of zero",
+        head="{here} pushes at zero command",
+        detail="its output is off by {offset:+}",
         need="changes of command",
     ),
     check="Set the command to zero and measure the output of the amplifier; trim its zero.",
@@ -271,7 +271,7 @@ DEADBAND = Term(
     stands=(stand("drive"),),
     look_alikes={
         "friction.coulomb": "move it by hand or by the other motor: friction is still there, a dead band is not",
-        "drive.offset": "commands of both signs: a dead band loses on both, an offset gains on one",
+        "drive.offset": "commands of both signs: a dead band lowers both outputs, an offset raises one of them",
         "friction.stribeck": "a constant speed under growing load: a dead band shows by command, sticking by speed",
         "transmission.backlash": "small fast commands of one sign: a dead band loses them, backlash needs a reversal",
     },
@@ -303,7 +303,7 @@ GAIN_ASYMMETRY = Term(
     act={"command": "{m}.volts[{c}] = drive.gain_asymmetry({p}, {m}.volts[{c}])"},
     stands=(stand("drive"),),
     look_alikes={
-        "friction.asymmetry": "brake at speed: the gain goes by the sign of the command, friction by that of the speed",
+        "friction.asymmetry": "brake at speed: a gain follows the sign of the command, friction the sign of the speed",
         "drive.offset": "command at one, two and three times the size: a gain grows with it, an offset does not",
         "friction.load": "both signs of command at one tension: friction is the same for both, a gain is not",
     },
@@ -314,7 +314,7 @@ GAIN_ASYMMETRY = Term(
     phrase=Phrase(
         noun="unequal gain",
         head="{here} is stronger one way",
-        detail=("{a:%} {a:more|less} than asked for at positive commands and {a:%} {a:less|more} at negative ones"),
+        detail=("{a:%} {a:more|less} than commanded at positive commands and {a:%} {a:less|more} at negative ones"),
         need="commands of both signs",
     ),
     check=("Command the same size with either sign and measure both outputs; look for a weak half of the bridge."),
@@ -333,9 +333,9 @@ SATURATION = Term(
     act={"command": "{m}.volts[{c}] = drive.saturation({p}, {s}, {m}.volts[{c}])"},
     stands=(stand("drive"),),
     look_alikes={
-        "drive.supply_sag": "a hard push of one motor alone and of both: a limit does not ask what the other draws",
-        "drive.lag": "small and large steps: a lag takes the same time for both, a limit only spoils the large",
-        "transmission.slip": "hold the load still and push: a limit shows in the force, slip in a way that is lost",
+        "drive.supply_sag": "a hard push of one motor alone and of both: a limit does not depend on the other motor",
+        "drive.lag": "small and large steps: a lag takes the same time for both, a limit changes the large",
+        "transmission.slip": "hold the load still and push: a limit shows in the force, slip in lost travel",
         "friction.viscous": "hard acceleration from standstill: a limit shows at once, drag only at speed",
     },
     typical={"limit": (0.3, 0.9)},
@@ -344,9 +344,9 @@ SATURATION = Term(
     order=20,
     state=SATURATION_STATE,
     phrase=Phrase(
-        noun="a lower limit",
-        head="{here} runs out of push",
-        detail="beyond {limit} there is no more",
+        noun="saturation",
+        head="{here} saturates",
+        detail="its output stops at {limit}",
         need="commands near the limit",
     ),
     check="Look at the current limit that is set in the amplifier and at the voltage of its supply.",
@@ -371,8 +371,8 @@ SUPPLY_SAG = Term(
         stand("drive", "supply"),
     ),
     look_alikes={
-        "drive.saturation": "a hard push of one motor alone and of both: sag asks what the other draws",
-        "drive.thermal": "the same burst cold and after a minute: sag is there from the first moment",
+        "drive.saturation": "a hard push of one motor alone and of both: sag depends on what the other motor draws",
+        "drive.thermal": "the same burst cold and after a minute: sag shows from the first moment",
         "friction.viscous": "hold the load still and command more: sag shows without speed",
         "friction.load": "load the other motor at constant tension: sag changes the gain, friction stays",
     },
@@ -383,7 +383,7 @@ SUPPLY_SAG = Term(
     phrase=Phrase(
         noun="a weak supply",
         head="the supply of {here} sags",
-        detail="{k:%} is lost for each {form:words} that all drives ask for",
+        detail="{k:%} is lost for each {form:words} of all drives together",
         need="hard work of all drives at once",
         forms={"": "{command}", "power": "{command} squared"},
     ),

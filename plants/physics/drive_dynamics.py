@@ -31,8 +31,8 @@ class LagSettings(Settings):
 
     term: Literal["drive.lag"] = "drive.lag"
     node: Node
-    tau: float = quantity(unit="s", ge=0, le=10, help="how late it is; 0 is no lag")
-    order: Literal[1, 2] = Field(default=1, description="of the lag")
+    tau: float = quantity(unit="s", ge=0, le=10, help="time constant of the lag; 0 is no lag")
+    order: Literal[1, 2] = Field(default=1, description="order of the lag")
     zeta: float = quantity(0.7, unit="", ge=0.05, le=20, help="damping of order 2")
 
 
@@ -81,15 +81,15 @@ class ThermalSettings(Settings):
 
     term: Literal["drive.thermal"] = "drive.thermal"
     node: Node
-    a: float = quantity(unit="", ge=-2, le=5, help="loss at V_ref when warm through; negative where it gains")
-    tau: float = quantity(30.0, unit="s", gt=0, le=1e5, help="time that it takes to warm")
-    V_ref: float = quantity(1.0, unit="V", gt=0, le=100, help="steady command at which it is warm")
+    a: float = quantity(unit="", ge=-2, le=5, help="loss at V_ref when warm; negative: an increase")
+    tau: float = quantity(30.0, unit="s", gt=0, le=1e5, help="time constant of the warming")
+    V_ref: float = quantity(1.0, unit="V", gt=0, le=100, help="steady command of the loss a")
     ease: float = quantity(
-        0.0, unit="", ge=-2, le=5, help="of a drive: loss of the dry friction that it works against, in the same way"
+        0.0, unit="", ge=-2, le=5, help="of a drive: loss of the dry friction at its body when warm, as a"
     )
     form: Literal["exponential", "linear", "hyperbolic"] = Field(
         default="exponential",
-        description="of what is left at heat h: exp(-a h), 1 - a h (magnets), 1/(1 + a h) (resistance)",
+        description="factor of the gain at heat h: exp(-a h), 1 - a h (magnets), 1/(1 + a h) (resistance)",
     )
 
 
@@ -173,9 +173,9 @@ LAG = Term(
     stands=(stand("drive"),),
     look_alikes={
         "timing.delay": "a sweep up to half the sample rate: a lag weakens the fast part, a delay only turns its phase",
-        "structure.resonance": "a sweep: a lag falls off for good, a resonance has a peak",
+        "structure.resonance": "a sweep: the gain of a lag only falls, a resonance has a peak",
         "tape.viscoelastic": "one motor with the tape off: a lag stays",
-        "drive.saturation": "small and large steps: a lag takes the same time for both, a limit only spoils the large",
+        "drive.saturation": "small and large steps: a lag takes the same time for both, a limit changes the large",
     },
     typical={"tau": (0.3, 3.0)},
     scale={"tau": "sample period"},
@@ -184,8 +184,8 @@ LAG = Term(
     state=LAG_STATE,
     phrase=Phrase(
         noun="a lag",
-        head="{here} comes late and soft",
-        detail="it takes {tau} to build up what is asked for",
+        head="{here} responds with a lag",
+        detail="its output follows the command with a time constant of {tau}",
         need="quick changes of the command",
     ),
     check="Look for a filter on the command input and at the gains of the current loop.",
@@ -212,7 +212,7 @@ THERMAL = Term(
         stand("body", "rubs"),
     ),
     look_alikes={
-        "drive.supply_sag": "the same burst cold and after a minute of work: sag is there from the first moment",
+        "drive.supply_sag": "the same burst cold and after a minute of work: sag shows from the first moment",
         "geometry.radius_change": "wind there and back slowly: a radius comes back with the tape, heat does not",
         "friction.coulomb": "the same slow move cold and warm: Coulomb friction does not change",
     },
@@ -222,7 +222,7 @@ THERMAL = Term(
     passive=False,
     state=THERMAL_STATE,
     phrase=Phrase(
-        noun="drift with warmth",
+        noun="thermal drift",
         head="{here} changes as it warms",
         detail="{a:%} {a:weaker|stronger} once warm, with a time constant of {tau}",
         need="a longer time of hard work",

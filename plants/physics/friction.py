@@ -76,7 +76,7 @@ class QuadraticSettings(Settings):
 
     term: Literal["friction.quadratic"] = "friction.quadratic"
     node: Node
-    Q: float = quantity(unit="", ge=0, le=1e6, help="drag by the square of speed, Nms^2/rad^2 or Ns^2/m^2 by node")
+    Q: float = quantity(unit="", ge=0, le=1e6, help="quadratic drag, Nms^2/rad^2 or Ns^2/m^2 by node")
 
 
 class QuadraticParams(NamedTuple):
@@ -103,11 +103,11 @@ class StribeckSettings(Settings):
     term: Literal["friction.stribeck"] = "friction.stribeck"
     node: Node
     F_s: float = quantity(
-        unit="", ge=0, le=1e4, help="dry friction at standstill, but for what other terms add, Nm or N by node"
+        unit="", ge=0, le=1e4, help="dry friction at standstill, without other terms, Nm or N by node"
     )
     v_s: float = quantity(unit="", gt=0, le=1e3, help="Stribeck speed, rad/s or m/s by node")
     form: Literal["gaussian", "exponential", "tustin"] = Field(
-        default="gaussian", description="how it falls with speed: exp(-(v/v_s)^2), exp(-|v|/v_s), 1/(1 + |v|/v_s)"
+        default="gaussian", description="fall with speed: exp(-(v/v_s)^2), exp(-|v|/v_s), 1/(1 + |v|/v_s)"
     )
 
 
@@ -184,7 +184,7 @@ VISCOUS = Term(
     stands=(stand("body"),),
     look_alikes={
         "friction.coulomb": "constant speeds over a decade: only viscous friction grows with speed",
-        "drive.supply_sag": "load the other motor at constant speed: sag changes the gain, grease does not",
+        "drive.supply_sag": "load the other motor at constant speed: sag changes the gain, viscous friction does not",
     },
     typical={"B": (0.1, 0.5)},
     order=100,
@@ -219,9 +219,9 @@ QUADRATIC = Term(
     scale={"Q": "force/speed^2"},
     since=2,
     phrase=Phrase(
-        noun="drag by the square of speed",
-        head="{here} drags by the square of its speed",
-        detail="{Q} of it",
+        noun="quadratic drag",
+        head="{here} drags with the square of its speed",
+        detail="its coefficient is {Q}",
         need="moves at several speeds",
     ),
     check="Look for a fan, a cover or an open wheel that moves air or oil.",
@@ -239,7 +239,7 @@ STRIBECK = Term(
     act={"force": "{m}.dry[{i}] += {r} * friction.stribeck({p}, {m}.dry_base[{i}] / {r}, {r} * {m}.vm[{i}])"},
     stands=(stand("body"),),
     look_alikes={
-        "friction.presliding": "reverse by a tiny way: a spring with hysteresis is presliding",
+        "friction.presliding": "reverse by a tiny distance: a spring with hysteresis is presliding",
         "friction.coulomb": "constant speeds from crawl to full: Coulomb stays flat",
         "friction.load": "break away at three tensions: sticking is there without any tension",
         "drive.deadband": "break away against a spring: sticking shows in force, the dead band in the command only",
@@ -254,7 +254,7 @@ STRIBECK = Term(
         need="standstills and slow moves",
     ),
     check=(
-        "Pull slowly with a spring balance and compare the force that starts it with the force that "
+        "Pull slowly with a spring balance and compare the force that starts it and the force that "
         "keeps it moving; look at the lubrication."
     ),
     search=(Size("F_s", "force", 0.1, offset="dry"), Shape("v_s", "speed", (0.012, 0.035, 0.1, 0.3, 0.9), 4.0)),

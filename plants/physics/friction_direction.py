@@ -27,7 +27,11 @@ class AsymmetrySettings(Settings):
         unit="", ge=-0.99, le=0.99, help="share by which dry friction is larger forwards and smaller backwards"
     )
     B_a: float = quantity(
-        0.0, unit="", ge=-1e5, le=1e5, help="the same that grows with speed, Nms/rad or Ns/m by node; never below 0"
+        0.0,
+        unit="",
+        ge=-1e5,
+        le=1e5,
+        help="viscous difference of the directions, Nms/rad or Ns/m; never below 0",
     )
 
 

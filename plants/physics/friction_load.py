@@ -31,9 +31,9 @@ class LoadSettings(Settings):
 
     term: Literal["friction.load"] = "friction.load"
     node: Node
-    mu: float = quantity(unit="", ge=-1.0, le=1.0, help="friction as a share of the force that presses, at its lever")
+    mu: float = quantity(unit="", ge=-1.0, le=1.0, help="friction as a share of the load, at its lever")
     by: Literal["joints", "weight"] = Field(
-        default="joints", description="what presses at a body of a described machine: its joints, or its weight"
+        default="joints", description="load of a body of a described machine: its joints, or its weight"
     )
 
 
@@ -135,9 +135,9 @@ LOAD = Term(
     axis="tension",
     order=110,
     phrase=Phrase(
-        noun="friction from load",
-        head="{here} drags by its load",
-        detail="friction {mu:grows|falls} by {mu:%} of the load",
+        noun="load-dependent friction",
+        head="the friction of {here} depends on its load",
+        detail="it {mu:grows|falls} by {mu:%} of the load",
         need="moves under several loads",
     ),
     check="Pull slowly with and without the load; look at the bearing that carries it.",

@@ -31,12 +31,12 @@ class PositionSettings(Settings):
 
     term: Literal["friction.position"] = "friction.position"
     node: Node
-    A: float = quantity(unit="", ge=-1e4, le=1e4, help="amplitude of dry friction along the way, Nm or N by node")
+    A: float = quantity(unit="", ge=-1e4, le=1e4, help="amplitude of the change of dry friction, Nm or N by node")
     phi: float = quantity(0.0, unit="rad", ge=-100, le=100, help="phase at position 0")
-    length: float = quantity(unit="", gt=0, le=1e3, help="of a wave; width of a step or a spot; rad or m by node")
-    form: Literal["wave", "step", "spot"] = Field(default="wave", description="how it changes")
-    at: float = quantity(0.0, unit="", ge=-1e6, le=1e6, help="where the step or the spot is, rad or m by node")
-    slope: float = quantity(0.0, unit="", ge=-1e6, le=1e6, help="growth of dry friction along the way, N/m or Nm/rad")
+    length: float = quantity(unit="", gt=0, le=1e3, help="length of a wave; width of a step or spot; rad or m by node")
+    form: Literal["wave", "step", "spot"] = Field(default="wave", description="shape of the change")
+    at: float = quantity(0.0, unit="", ge=-1e6, le=1e6, help="position of the step or the spot, rad or m by node")
+    slope: float = quantity(0.0, unit="", ge=-1e6, le=1e6, help="growth of dry friction with position, N/m or Nm/rad")
 
 
 class PositionParams(NamedTuple):
@@ -75,10 +75,10 @@ POSITION = Term(
     act={"force": "{m}.dry[{i}] += {r} * friction_position.along({p}, {r} * {m}.qm[{i}])"},
     stands=(stand("body", "general"),),
     look_alikes={
-        "load.bump": "pass slowly over the whole way: a bump is narrow, friction along the way changes gently",
-        "load.spring": "there and back slowly: a spring helps one way, friction hinders both",
+        "load.bump": "pass slowly over the whole travel: a tight spot is narrow, this friction changes gently",
+        "load.spring": "there and back slowly: a spring helps in one direction, friction hinders in both",
         "friction.coulomb": "the same short move at several places: plain dry friction is the same everywhere",
-        "friction.asymmetry": "the same short move at several places, both ways: an asymmetry does not ask where",
+        "friction.asymmetry": "the same short move at several places, both ways: an asymmetry is the same everywhere",
     },
     typical={"A": (0.1, 0.6), "length": (0.5, 2.0)},
     scale={"A": "force", "length": "travel"},
@@ -86,12 +86,12 @@ POSITION = Term(
     order=105,
     since=2,
     phrase=Phrase(
-        noun="friction that changes along the way",
+        noun="position-dependent friction",
         head="{here} rubs more at some places",
         detail="{A} {A:more|less}, over {length}",
-        need="slow moves over the whole way, both directions",
+        need="slow moves over the whole travel, in both directions",
     ),
-    check="Pull slowly over the whole way with a spring balance; look at the rail and at worn stretches.",
+    check="Pull slowly over the whole travel with a spring balance; look at the rail and at worn stretches.",
     units={"A": "force", "length": "position", "at": "position", "slope": "stiffness"},
     needs=Needs(dry=True),
     # A step beyond the travel, or a wide spot, is equivalent to constant dry friction: a search tries waves alone.

@@ -33,7 +33,7 @@ class RadiusChangeSettings(Settings):
     d: float = quantity(unit="m", ge=-0.02, le=0.02, help="growth of the radius in a turn: the thickness of the tape")
     rho_h: float = quantity(PAPER, unit="kg/m^2", ge=0, le=1e4, help="density times width of the tape, for the inertia")
     R_min: float = quantity(0.02, unit="m", gt=0, le=1, help="radius of the empty reel")
-    other: float = quantity(0.0, unit="", ge=0, le=1, help="share of d of the other reel: 1 where its tape is the same")
+    other: float = quantity(0.0, unit="", ge=0, le=1, help="share of d at the other reel: 1 for the same tape")
 
 
 class RadiusChangeParams(NamedTuple):
@@ -137,9 +137,9 @@ RADIUS_CHANGE = Term(
     },
     stands=(stand("body", "reel"),),
     look_alikes={
-        "sensor.scale": "two turns and two more: a growing reel goes with the square of the way, a factor does not",
+        "sensor.scale": "two turns and two more: a growing reel errs by the square of the way, a scale does not",
         "drive.thermal": "wind there and back slowly: a radius comes back with the tape, heat does not",
-        "tape.viscoelastic": "hold the tape still under tension: a radius waits, relaxation goes on",
+        "tape.viscoelastic": "hold the tape still under tension: a radius stays, relaxation goes on",
         "transmission.creep": "the same winding at two tensions: creep grows with the force, a radius does not",
         "load.spring": "the same short move at both ends of the travel: a spring pulls at rest, a radius does not",
     },

@@ -26,12 +26,12 @@ class ThicknessSettings(Settings):
     term: Literal["guide.thickness"] = "guide.thickness"
     node: Node
     A: float = quantity(unit="m", ge=-1e-2, le=1e-2, help="amplitude of the position error")
-    wavelength: float = quantity(0.15, unit="m", gt=1e-4, le=1e2, help="along the guide")
+    wavelength: float = quantity(0.15, unit="m", gt=1e-4, le=1e2, help="wavelength along the guide")
     phi: float = quantity(0.0, unit="rad", ge=-100, le=100, help="phase at position 0")
     A2: float = quantity(0.0, unit="m", ge=-1e-2, le=1e-2, help="amplitude at half the wavelength")
-    phi2: float = quantity(0.0, unit="rad", ge=-100, le=100, help="its phase")
+    phi2: float = quantity(0.0, unit="rad", ge=-100, le=100, help="phase of the second harmonic")
     A3: float = quantity(0.0, unit="m", ge=-1e-2, le=1e-2, help="amplitude at a third of the wavelength")
-    phi3: float = quantity(0.0, unit="rad", ge=-100, le=100, help="its phase")
+    phi3: float = quantity(0.0, unit="rad", ge=-100, le=100, help="phase of the third harmonic")
 
 
 class ThicknessParams(NamedTuple):
@@ -63,8 +63,8 @@ class StripSettings(Settings):
 
     term: Literal["guide.strip"] = "guide.strip"
     node: Node
-    longer: float = quantity(unit="", ge=0, le=0.02, help="share by which the path is longer than straight")
-    wavelength: float = quantity(0.1, unit="m", gt=1e-4, le=1e2, help="of the waves of the strip")
+    longer: float = quantity(unit="", ge=0, le=0.02, help="share by which the path is longer than a straight one")
+    wavelength: float = quantity(0.1, unit="m", gt=1e-4, le=1e2, help="wavelength of the strip")
     phi: float = quantity(0.0, unit="rad", ge=-100, le=100, help="phase at position 0")
 
 
@@ -97,7 +97,7 @@ class DirtSettings(Settings):
     term: Literal["guide.dirt"] = "guide.dirt"
     node: Node
     A: float = quantity(unit="m", ge=-1e-2, le=1e-2, help="largest position error")
-    at: float = quantity(unit="m", ge=-100, le=100, help="position of its middle")
+    at: float = quantity(unit="m", ge=-100, le=100, help="position of the middle")
     width: float = quantity(1e-3, unit="m", gt=1e-6, le=10, help="standard deviation of the bell")
 
 
@@ -138,10 +138,10 @@ THICKNESS = Term(
     ),
     look_alikes={
         "ripple.capstan": "lift the carriage, turn the capstan half a turn and repeat: only the capstan's wave moves",
-        "ripple.encoder": "start from another angle of the shaft: a disc goes with the angle, a strip with the place",
+        "ripple.encoder": "start from another angle of the shaft: a disc errs by the angle, a strip by the place",
         "load.bump": "the same travel seen by both sensors: thickness shows as a difference, a bump in both",
         "sensor.scale": "travel over several wavelengths: a scale error grows, waves do not",
-        "guide.strip": "travel over several wavelengths: the way along a wavy strip grows, thickness does not",
+        "guide.strip": "travel over several wavelengths: the path along a wavy strip grows, thickness does not",
         "guide.dirt": "several wavelengths of travel: dirt is at one place, thickness everywhere",
     },
     typical={"A": (2e-6, 5e-4), "wavelength": (0.02, 0.3)},
@@ -179,7 +179,7 @@ STRIP = Term(
     ),
     look_alikes={
         "sensor.scale": "look for the waves on top of the trend, two to each wave of the strip: a scale error has none",
-        "guide.thickness": "travel over several wavelengths: the way along a wavy strip grows, thickness does not",
+        "guide.thickness": "travel over several wavelengths: the path along a wavy strip grows, thickness does not",
     },
     typical={"longer": (1e-6, 1e-4), "wavelength": (0.05, 0.3)},
     axis="position",
@@ -187,7 +187,7 @@ STRIP = Term(
     phrase=Phrase(
         noun="a wavy strip",
         head="the strip at {here} is wavy",
-        detail="the way along it is {longer:%} longer than straight, in waves of {wavelength}",
+        detail="the path along it is {longer:%} longer than a straight one, in waves of {wavelength}",
         need=WAVES,
     ),
     check="Lay a straight edge along the strip and look for gaps; look at its tension and its supports.",

@@ -34,10 +34,10 @@ class HysteresisSettings(Settings):
 
     term: Literal["transmission.hysteresis"] = "transmission.hysteresis"
     node: Node
-    F_h: float = quantity(unit="", ge=0, le=1e5, help="part of the pull that turns with direction, N or Nm by joint")
-    z_h: float = quantity(unit="", gt=0, le=10, help="deflection over which it turns, m or rad by joint")
+    F_h: float = quantity(unit="", ge=0, le=1e5, help="force that reverses with direction, N or Nm by joint")
+    z_h: float = quantity(unit="", gt=0, le=10, help="deflection over which F_h reverses, m or rad by joint")
     form: Literal["dahl", "bouc_wen"] = Field(
-        default="dahl", description="how it turns: like an exponential, or rounder, like a hyperbolic tangent"
+        default="dahl", description="reversal: exponential, or rounder, like a hyperbolic tangent"
     )
 
 
@@ -90,10 +90,10 @@ HYSTERESIS = Term(
     act={"force": "linear.pull({m}, {l}, hysteresis.hysteresis({p}, {s}, {m}, {l}))"},
     stands=(stand("joint", "general spring"),),
     look_alikes={
-        "transmission.backlash": "reverse with a small force: in a gap nothing pushes back, a joint that gives does",
+        "transmission.backlash": "reverse with a small force: in a gap nothing pushes back, a compliant joint does",
         "friction.coulomb": "hold the far side and push the near one: friction needs a motion of the body, the joint "
         "only its deflection",
-        "structure.stiffening": "load and unload slowly: a bent spring law goes back the way it came",
+        "structure.stiffening": "load and unload slowly: a nonlinear spring follows the same curve back",
         "tape.viscoelastic": "load and hold: a relaxing joint creeps on, one with hysteresis stays",
     },
     typical={"F_h": (0.05, 0.5), "z_h": (0.002, 0.02)},
@@ -104,8 +104,8 @@ HYSTERESIS = Term(
     state=HYSTERESIS_STATE,
     phrase=Phrase(
         noun="hysteresis",
-        head="{here} gives another way than it comes back",
-        detail="{F_h} turns with direction, over a deflection of {z_h}",
+        head="{here} does not spring back along the same curve",
+        detail="{F_h} reverses with direction, over a deflection of {z_h}",
         need="slow reversals under load",
     ),
     check="Block the far side, load the joint slowly by hand both ways and watch whether it comes back.",

@@ -29,9 +29,9 @@ class SpringSettings(Settings):
     term: Literal["load.spring"] = "load.spring"
     node: Node
     k: float = quantity(unit="", ge=-1e6, le=1e6, help="stiffness, N/m or Nm/rad by node; negative pushes away")
-    x0: float = quantity(0.0, unit="", ge=-1e3, le=1e3, help="where it does not pull, m or rad by node")
+    x0: float = quantity(0.0, unit="", ge=-1e3, le=1e3, help="position of zero force, m or rad by node")
     bend: float = quantity(
-        0.0, unit="", ge=-1e12, le=1e12, help="1/m^2 or 1/rad^2: it stiffens far from x0, or yields where negative"
+        0.0, unit="", ge=-1e12, le=1e12, help="stiffening with distance from x0, 1/m^2 or 1/rad^2; negative softens"
     )
 
 
@@ -65,9 +65,9 @@ class CableChainSettings(Settings):
     term: Literal["load.cable_chain"] = "load.cable_chain"
     node: Node
     k: float = quantity(unit="", ge=0, le=1e6, help="stiffness of the chain's bend, N/m")
-    x0: float = quantity(0.0, unit="", ge=-1e3, le=1e3, help="where it does not pull, m")
-    F_h: float = quantity(0.0, unit="", ge=0, le=1e4, help="drag of links and cables on each other, N")
-    z_h: float = quantity(5e-3, unit="", gt=0, le=10.0, help="way after a reversal until the drag has turned, m")
+    x0: float = quantity(0.0, unit="", ge=-1e3, le=1e3, help="position of zero force, m")
+    F_h: float = quantity(0.0, unit="", ge=0, le=1e4, help="friction of links and cables on each other, N")
+    z_h: float = quantity(5e-3, unit="", gt=0, le=10.0, help="travel over which the friction reverses, m")
 
 
 class CableChainParams(NamedTuple):
@@ -133,14 +133,12 @@ class BumpSettings(Settings):
     term: Literal["load.bump"] = "load.bump"
     node: Node
     F: float = quantity(unit="", ge=-1e4, le=1e4, help="largest force, N or Nm by node")
-    at: float = quantity(unit="", ge=-1e4, le=1e4, help="position of its middle, m or rad by node")
+    at: float = quantity(unit="", ge=-1e4, le=1e4, help="position of the middle, m or rad by node")
     width: float = quantity(unit="", gt=0, le=1e3, help="standard deviation of the bell, m or rad by node")
     form: Literal["drag", "hill", "push"] = Field(
-        default="drag", description="against the motion, away from the middle, or always forwards"
+        default="drag", description="direction of the force: against the motion, away from the middle, or forwards"
     )
-    every_turn: bool = Field(
-        default=False, description="of a node that turns: at each turn instead of at one unwrapped angle"
-    )
+    every_turn: bool = Field(default=False, description="of a node that turns: at this angle of each turn, not once")
 
 
 class BumpParams(NamedTuple):
@@ -196,7 +194,7 @@ SPRING = Term(
         "drive.offset": "the same short move at both ends of the travel: an offset is the same everywhere",
         "load.cable_chain": "approach one place from both sides slowly: a spring pulls the same, a chain does not",
         "structure.stiffening": "displacements of one, two and three: a spring pulls in proportion",
-        "friction.asymmetry": "the same short move at both ends of the travel: friction does not ask where",
+        "friction.asymmetry": "the same short move at both ends of the travel: friction is the same everywhere",
     },
     typical={"k": (0.2, 1.0)},
     scale={"k": "force/travel"},
@@ -224,8 +222,8 @@ CABLE_CHAIN = Term(
     stands=(stand("body", "bounded"),),
     look_alikes={
         "load.spring": "approach one place from both sides slowly: a spring pulls the same, a chain does not",
-        "friction.presliding": "reverse in mid-travel: bristles turn within a tiny way, a chain within a long one",
-        "friction.coulomb": "reverse and look at the first piece of the way: Coulomb friction turns at once",
+        "friction.presliding": "reverse in mid-travel: bristles reverse within a tiny way, a chain within a long one",
+        "friction.coulomb": "reverse and look at the first part of the move: Coulomb friction reverses at once",
     },
     typical={"k": (0.2, 1.0), "F_h": (0.1, 0.5), "z_h": (0.01, 0.1)},
     scale={"k": "force/travel", "F_h": "force", "z_h": "travel"},
@@ -235,7 +233,7 @@ CABLE_CHAIN = Term(
     phrase=Phrase(
         noun="a cable chain",
         head="a cable chain pulls {here}",
-        detail="{k} by position and {F_h} of drag",
+        detail="{k} by position and {F_h} of friction",
         need="long moves with reversals",
     ),
     check="Unhook the cable chain and repeat the move.",
@@ -263,7 +261,7 @@ IMBALANCE = Term(
     phrase=Phrase(
         noun="imbalance",
         head="{here} is heavy on one side",
-        detail="{A} helps once a turn and hinders once a turn",
+        detail="{A} helps once and hinders once in each turn",
         need=TURNS,
     ),
     check=(
@@ -291,7 +289,7 @@ BUMP = Term(
         "sensor.missed_counts": "pass the place ten times: a bump comes back to zero error, lost counts add up",
         "guide.thickness": "the same travel seen by both sensors: thickness shows as a difference, a bump in both",
         "load.imbalance": "one slow turn: a bump is narrow, imbalance a sine",
-        "ripple.cogging": "several turns: a bump stands at one place, cogging everywhere",
+        "ripple.cogging": "several turns: a tight spot is at one place, cogging everywhere",
     },
     typical={"F": (0.2, 1.0), "width": (0.005, 0.05)},
     scale={"F": "force", "width": "travel"},

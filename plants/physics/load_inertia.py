@@ -29,7 +29,7 @@ class InertiaSettings(Settings):
     node: Node
     A: float = quantity(unit="", ge=-1e4, le=1e4, help="amplitude of the inertia about its mean, kg m^2 (kg)")
     phi: float = quantity(0.0, unit="rad", ge=-100, le=100, help="phase at angle 0")
-    order: float = quantity(1.0, unit="", gt=0, le=100, help="times a turn; 2 for a crank")
+    order: float = quantity(1.0, unit="", gt=0, le=100, help="periods in one turn; 2 for a crank")
 
 
 class InertiaParams(NamedTuple):
@@ -97,7 +97,7 @@ INERTIA = Term(
     phrase=Phrase(
         noun="uneven inertia",
         head="{here} is heavier to turn at some angles",
-        detail="its inertia is up to {A} more and less",
+        detail="its inertia is up to {A} above and below its mean",
         need=f"{TURNS}, with strong acceleration",
     ),
     check="Look for a crank or a linkage behind it, and compare how fast it starts at several angles.",

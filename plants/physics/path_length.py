@@ -34,8 +34,8 @@ class PathLengthSettings(Settings):
     node: Node
     excess: float = quantity(unit="m", ge=-1, le=1, help="length beyond that of a limp tape at the tension F_t")
     F_t: float = quantity(0.1, unit="N", gt=0, le=1e4, help="tension at which the length was set")
-    power: float = quantity(0.5, unit="", gt=0, le=4, help="of the tension; 1/2 for a strip round small guides")
-    least: float = quantity(0.005, unit="N", gt=0, le=1e4, help="tension below which the tape hangs as it does there")
+    power: float = quantity(0.5, unit="", gt=0, le=4, help="exponent of the tension; 1/2 for small guides")
+    least: float = quantity(0.005, unit="N", gt=0, le=1e4, help="tension below which the length is constant")
 
 
 class PathLengthParams(NamedTuple):
@@ -86,10 +86,10 @@ PATH_LENGTH = Term(
     act={"reading": "path_length.shown({p}, {m}, {c}, {l}, {i})"},
     stands=(stand("joint", "spring span path"),),
     look_alikes={
-        "sensor.scale": "stand still and pull harder at the tape: a path gets shorter, a factor shows nothing",
-        "geometry.radius_change": "hold the tension while a reel fills: a path stays as long, a reel goes on growing",
-        "transmission.creep": "stand still and pull harder, then let go: a path comes back at once, creep does not",
-        "tape.viscoelastic": "pull harder and wait: a path is shorter at once, a tape that relaxes gets there slowly",
+        "sensor.scale": "stand still and pull harder at the tape: the path gets shorter, a wrong scale shows nothing",
+        "geometry.radius_change": "hold the tension while a reel fills: the path keeps its length, a reel grows",
+        "transmission.creep": "stand still and pull harder, then let go: the path comes back at once, creep does not",
+        "tape.viscoelastic": "pull harder and wait: the path shortens at once, a tape that relaxes changes slowly",
     },
     typical={"excess": (2e-3, 1e-2)},
     axis="tension",
@@ -97,7 +97,7 @@ PATH_LENGTH = Term(
     since=2,
     static=False,
     phrase=Phrase(
-        noun="a path that gives with tension",
+        noun="a tension-dependent path",
         head="{here} gets longer as its tension falls",
         detail="it is {excess} longer than a limp tape would be at {F_t}",
         need="changes of tension",

@@ -148,18 +148,18 @@ def curve(term: Term, settings: Any, kind: str) -> Curve:
 
     y, without = seen(got), seen(none)
     words = {
-        "volts": "at the motor, V",
+        "volts": "voltage at the motor, V",
         "read": f"reading, {way}",
-        "pull": "carried by the contact, N" if settings.node == "capstan" else "pull, N",
-        "dry": f"drag, {push}",
+        "pull": "force of the contact, N" if settings.node == "capstan" else "pull, N",
+        "dry": f"friction, {push}",
     }
-    y_words = f"drag, {push}" if term.name.startswith("friction.") else words.get(shown, f"force, {push}")
+    y_words = f"friction, {push}" if term.name.startswith("friction.") else words.get(shown, f"force, {push}")
     if shown == "read" and not term.shown:
-        y, without, y_words = y - without, 0.0 * y, f"reading off by, {way}"
+        y, without, y_words = y - without, 0.0 * y, f"error of the reading, {way}"
     x, x_words = {
         "speeds": (hand.v, f"speed, {way}/s"), "commands": (hand.volts, "command, V"), "wait": (hand.t, "time, s"),
         "step": (hand.t, "time, s"), "turn": (hand.x / (2 * np.pi), "turns"),
-        "pull": (none["pull"][:, link], "pull of a tape that gives in proportion, N"),
+        "pull": (none["pull"][:, link], "pull of a linear tape, N"),
     }.get(motion, (hand.x, f"position, {way}"))  # fmt: skip
     return Curve(x, y, without, x_words, y_words, settings, kind)
 

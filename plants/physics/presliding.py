@@ -36,13 +36,13 @@ class PreslidingSettings(Settings):
 
     term: Literal["friction.presliding"] = "friction.presliding"
     node: Node
-    z_s: float = quantity(unit="", ge=0, le=1.0, help="travel on the bristles before it slides, rad or m by node")
+    z_s: float = quantity(unit="", ge=0, le=1.0, help="travel on the bristles before sliding, rad or m by node")
     form: Literal["dahl", "lugre"] = Field(
-        default="dahl", description="of the bristles; lugre has damping and a rise at standstill besides"
+        default="dahl", description="law of the bristles; lugre adds damping and a rise at standstill"
     )
     tau_s: float = quantity(3e-3, unit="s", ge=0, le=1.0, help="damping of the bristles over their stiffness; lugre")
-    rise: float = quantity(0.0, unit="", ge=0, le=10, help="share by which it is stiffer to start than to keep; lugre")
-    v_s: float = quantity(1.0, unit="", gt=0, le=1e3, help="Stribeck speed of that, rad/s or m/s by node")
+    rise: float = quantity(0.0, unit="", ge=0, le=10, help="share by which breakaway exceeds sliding friction; lugre")
+    v_s: float = quantity(1.0, unit="", gt=0, le=1e3, help="Stribeck speed of the rise, rad/s or m/s by node")
 
 
 class PreslidingParams(NamedTuple):
@@ -128,7 +128,7 @@ PRESLIDING = Term(
     act={"force": "presliding.replace({p}, {s}, {m}, {i}, {r})"},
     stands=(stand("body", "dry"),),
     look_alikes={
-        "friction.stribeck": "reverse by a tiny way: plain dry friction holds still, bristles move as a spring",
+        "friction.stribeck": "reverse by a tiny distance: dry friction stands still, bristles move as a spring",
         "transmission.backlash": "reverse with a small force: bristles push back at once, a gap does not",
         "tape.viscoelastic": "hold and wait: bristles stay where they are, a relaxing tape moves on",
         "timing.delay": "steps far below break-away: a delay does not let a stuck node move",
@@ -140,8 +140,8 @@ PRESLIDING = Term(
     state=PRESLIDING_STATE,
     phrase=Phrase(
         noun="a spring before breakaway",
-        head="{here} gives like a spring before it breaks away",
-        detail="it springs over {z_s}",
+        head="{here} moves like a spring before it breaks away",
+        detail="the spring acts over {z_s}",
         need="standstills and slow reversals",
     ),
     check="Push lightly without moving it, let go and see whether it springs back; look at seals and wipers.",

@@ -33,10 +33,10 @@ class CoggingSettings(Settings):
     phi: float = quantity(0.0, unit="rad", ge=-100, le=100, help="phase at angle 0")
     per_turn: float = quantity(1.0, unit="", gt=0, le=1e4, help="teeth in one turn")
     A2: float = quantity(0.0, unit="", ge=-1e4, le=1e4, help="amplitude of the second harmonic")
-    phi2: float = quantity(0.0, unit="rad", ge=-100, le=100, help="its phase")
+    phi2: float = quantity(0.0, unit="rad", ge=-100, le=100, help="phase of the second harmonic")
     A3: float = quantity(0.0, unit="", ge=-1e4, le=1e4, help="amplitude of the third harmonic")
-    phi3: float = quantity(0.0, unit="rad", ge=-100, le=100, help="its phase")
-    turn: float = quantity(TURN, unit="", gt=0, le=1e3, help="way of one turn: 2 pi, or the pitch in m where it slides")
+    phi3: float = quantity(0.0, unit="rad", ge=-100, le=100, help="phase of the third harmonic")
+    turn: float = quantity(TURN, unit="", gt=0, le=1e3, help="travel of one turn: 2 pi, or a pitch in m of a slide")
 
 
 class CoggingParams(NamedTuple):
@@ -77,11 +77,13 @@ class EncoderSettings(Settings):
     A2: float = quantity(
         0.0, unit="", ge=-10, le=10, help="amplitude of the second harmonic: an oval, or a tilted disc"
     )
-    phi2: float = quantity(0.0, unit="rad", ge=-100, le=100, help="its phase")
+    phi2: float = quantity(0.0, unit="rad", ge=-100, le=100, help="phase of the second harmonic")
     A3: float = quantity(0.0, unit="", ge=-10, le=10, help="amplitude of the third harmonic")
-    phi3: float = quantity(0.0, unit="rad", ge=-100, le=100, help="its phase")
-    order: float = quantity(1.0, unit="", gt=0, le=1e5, help="times a turn; number of lines for an error of division")
-    turn: float = quantity(TURN, unit="", gt=0, le=1e3, help="way of one turn: 2 pi, or that in m where it slides")
+    phi3: float = quantity(0.0, unit="rad", ge=-100, le=100, help="phase of the third harmonic")
+    order: float = quantity(
+        1.0, unit="", gt=0, le=1e5, help="periods in one turn; number of lines for a division error"
+    )
+    turn: float = quantity(TURN, unit="", gt=0, le=1e3, help="travel of one turn: 2 pi, or a pitch in m of a slide")
 
 
 class EncoderParams(NamedTuple):
@@ -131,9 +133,9 @@ COGGING = Term(
     look_alikes={
         "load.imbalance": "turn slowly and count: imbalance comes once a turn, cogging many times",
         "ripple.reel": "the same turns at another tension: cogging stays, an eccentric reel follows the tension",
-        "ripple.encoder": "slow and fast turns: a force fades behind the inertia when it is fast, a reading error not",
+        "ripple.encoder": "slow and fast turns: the inertia hides a force in fast turns, a reading error stays",
         "structure.resonance": "two constant speeds: cogging keeps its angle, a resonance its frequency",
-        "load.bump": "several turns: a bump stands at one place, cogging everywhere",
+        "load.bump": "several turns: a tight spot is at one place, cogging everywhere",
     },
     typical={"A": (0.02, 0.3), "per_turn": (3, 48)},
     scale={"A": "force"},
@@ -181,7 +183,7 @@ ENCODER = Term(
         "change the tape's tension: a capstan out of round pulls harder, a reading error stays",
         "ripple.cogging": "slow and fast turns: a reading error does not fade with the inertia, a force does",
         "load.imbalance": "slow and fast turns: a reading error does not fade with the inertia, a force does",
-        "guide.thickness": "start from another angle of the shaft: a disc goes with the angle, a strip with the place",
+        "guide.thickness": "start from another angle of the shaft: a disc errs by the angle, a strip by the place",
         "ripple.reel": "wind until the reel has another radius: a reel's wave in the capstan's angle moves with it",
         "timing.jitter": "two constant speeds: ripple stays on its angle, jitter has none and grows with speed",
     },
@@ -191,7 +193,7 @@ ENCODER = Term(
     phrase=Phrase(
         noun="a disc off centre",
         head="the disc of {here} is off centre",
-        detail="it reads up to {A} ahead and behind once a turn{harmonics:words}",
+        detail="it reads up to {A} too much and too little once a turn{harmonics:words}",
         need=TURNS,
     ),
     check=(

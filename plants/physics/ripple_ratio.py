@@ -46,13 +46,13 @@ class RatioSettings(Settings):
     A: float = quantity(unit="", ge=-10, le=10, help="amplitude, in the unit of the joint's elongation: rad or m")
     phi: float = quantity(0.0, unit="rad", ge=-100, le=100, help="phase at angle 0")
     A2: float = quantity(0.0, unit="", ge=-10, le=10, help="amplitude of the second harmonic")
-    phi2: float = quantity(0.0, unit="rad", ge=-100, le=100, help="its phase")
+    phi2: float = quantity(0.0, unit="rad", ge=-100, le=100, help="phase of the second harmonic")
     A3: float = quantity(0.0, unit="", ge=-10, le=10, help="amplitude of the third harmonic")
-    phi3: float = quantity(0.0, unit="rad", ge=-100, le=100, help="its phase")
-    end: Literal["from", "to"] = Field(default="from", description="end of the joint in whose angle it repeats")
-    order: float = quantity(1.0, unit="", gt=0, le=1e4, help="times a turn; 2 for a harmonic drive, or teeth")
-    turn: float = quantity(TURN, unit="", gt=0, le=1e3, help="way of one turn: 2 pi, or that in m where the end slides")
-    c: float = quantity(0.0, unit="", ge=0, le=1e12, help="stiffness, of a joint that is said to be rigid")
+    phi3: float = quantity(0.0, unit="rad", ge=-100, le=100, help="phase of the third harmonic")
+    end: Literal["from", "to"] = Field(default="from", description="end of the joint by whose angle the error repeats")
+    order: float = quantity(1.0, unit="", gt=0, le=1e4, help="periods in one turn; 2 for a harmonic drive, or teeth")
+    turn: float = quantity(TURN, unit="", gt=0, le=1e3, help="travel of one turn: 2 pi, or a pitch in m of a slide")
+    c: float = quantity(0.0, unit="", ge=0, le=1e12, help="stiffness of a joint that is described as rigid")
 
 
 class RatioParams(NamedTuple):
@@ -126,7 +126,7 @@ RATIO = Term(
     look_alikes={
         "ripple.encoder": "sensors on both ends: a ratio moves the far end, a reading error only its own sensor",
         "ripple.cogging": "slow and fast turns: a ratio moves the far end as far at any low speed, a force fades",
-        "load.imbalance": "lay the axis level: imbalance hangs on gravity, a ratio on nothing",
+        "load.imbalance": "lay the axis level: imbalance depends on gravity, a ratio does not",
         "ripple.torque": "turn by hand with the power off: a ratio is still there, a gain is not",
     },
     typical={"A": (1e-4, 1e-2)},

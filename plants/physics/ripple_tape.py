@@ -29,10 +29,10 @@ class ReelSettings(Settings):
     node: Node
     e: float = quantity(unit="m", ge=-0.02, le=0.02, help="eccentricity")
     phi: float = quantity(0.0, unit="rad", ge=-100, le=100, help="phase at angle 0")
-    e2: float = quantity(0.0, unit="m", ge=-0.02, le=0.02, help="of the second harmonic: an oval")
-    phi2: float = quantity(0.0, unit="rad", ge=-100, le=100, help="its phase")
-    e3: float = quantity(0.0, unit="m", ge=-0.02, le=0.02, help="of the third harmonic: a triangle")
-    phi3: float = quantity(0.0, unit="rad", ge=-100, le=100, help="its phase")
+    e2: float = quantity(0.0, unit="m", ge=-0.02, le=0.02, help="second harmonic: an oval")
+    phi2: float = quantity(0.0, unit="rad", ge=-100, le=100, help="phase of the second harmonic")
+    e3: float = quantity(0.0, unit="m", ge=-0.02, le=0.02, help="third harmonic: a triangle")
+    phi3: float = quantity(0.0, unit="rad", ge=-100, le=100, help="phase of the third harmonic")
 
 
 class CapstanSettings(Settings):
@@ -40,12 +40,12 @@ class CapstanSettings(Settings):
 
     term: Literal["ripple.capstan"] = "ripple.capstan"
     node: Node
-    a: float = quantity(unit="m", ge=-5e-3, le=5e-3, help="amplitude of the way: the eccentricity of the capstan")
+    a: float = quantity(unit="m", ge=-5e-3, le=5e-3, help="amplitude of the travel: the eccentricity of the capstan")
     phi: float = quantity(0.0, unit="rad", ge=-100, le=100, help="phase at angle 0")
     a2: float = quantity(0.0, unit="m", ge=-5e-3, le=5e-3, help="second harmonic: half the radius deviation of an oval")
-    phi2: float = quantity(0.0, unit="rad", ge=-100, le=100, help="its phase")
+    phi2: float = quantity(0.0, unit="rad", ge=-100, le=100, help="phase of the second harmonic")
     a3: float = quantity(0.0, unit="m", ge=-5e-3, le=5e-3, help="third harmonic")
-    phi3: float = quantity(0.0, unit="rad", ge=-100, le=100, help="its phase")
+    phi3: float = quantity(0.0, unit="rad", ge=-100, le=100, help="phase of the third harmonic")
 
 
 class WheelParams(NamedTuple):

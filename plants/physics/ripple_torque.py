@@ -26,10 +26,10 @@ class TorqueSettings(Settings):
     phi: float = quantity(0.0, unit="rad", ge=-100, le=100, help="phase at angle 0")
     per_turn: float = quantity(6.0, unit="", gt=0, le=1e4, help="periods in one turn: six times the pole pairs")
     A2: float = quantity(0.0, unit="", ge=-0.95, le=0.95, help="amplitude of the second harmonic")
-    phi2: float = quantity(0.0, unit="rad", ge=-100, le=100, help="its phase")
+    phi2: float = quantity(0.0, unit="rad", ge=-100, le=100, help="phase of the second harmonic")
     A3: float = quantity(0.0, unit="", ge=-0.95, le=0.95, help="amplitude of the third harmonic")
-    phi3: float = quantity(0.0, unit="rad", ge=-100, le=100, help="its phase")
-    turn: float = quantity(TURN, unit="", gt=0, le=1e3, help="way of one turn: 2 pi, or that in m where it slides")
+    phi3: float = quantity(0.0, unit="rad", ge=-100, le=100, help="phase of the third harmonic")
+    turn: float = quantity(TURN, unit="", gt=0, le=1e3, help="travel of one turn: 2 pi, or a pitch in m of a slide")
 
 
 class TorqueParams(NamedTuple):
@@ -66,10 +66,10 @@ TORQUE = Term(
     act={"command": "ripple_torque.torque({p}, {m}, {c}, {i}, {r})"},
     stands=(stand("drive", "general"),),
     look_alikes={
-        "ripple.cogging": "run out with the power off: cogging stays, a ripple of the gain goes with the command",
+        "ripple.cogging": "run out with the power off: cogging stays, a ripple of the gain ends with the command",
         "load.imbalance": "the same turn with twice the push: imbalance stays as it is, a ripple of the gain doubles",
         "ripple.ratio": "turn by hand with the power off: a ratio is still there, a gain is not",
-        "drive.gain_asymmetry": "push both ways at one angle: an asymmetry hangs on the sign, a ripple on the angle",
+        "drive.gain_asymmetry": "push both ways at one angle: an asymmetry depends on the sign, a ripple on the angle",
     },
     typical={"A": (0.02, 0.2), "per_turn": (3, 42)},
     axis="angle",
@@ -79,7 +79,7 @@ TORQUE = Term(
     phrase=Phrase(
         noun="torque ripple",
         head="{here} pushes unevenly",
-        detail="its gain is up to {A:%} more and less, {per_turn:g} times a turn{harmonics:words}",
+        detail="its gain varies by up to {A:%}, {per_turn:g} times a turn{harmonics:words}",
         need=TURNS,
         again=" as often",
     ),

@@ -36,13 +36,13 @@ class MissedCountsSettings(Settings):
     over: float = quantity(1e-3, unit="s", gt=0, le=10, help="time that a jump takes")
     each: float = quantity(0.0, unit="", ge=-10, le=10, help="jump at each passage of the mark, rad or m")
     way: Literal["forward", "backward"] = Field(default="forward", description="direction in which the mark is passed")
-    mark: float = quantity(0.0, unit="", ge=-100, le=100, help="where the mark is, rad or m")
-    turn: float = quantity(2.0 * math.pi, unit="", gt=0, le=1e3, help="way from mark to mark, rad or m")
+    mark: float = quantity(0.0, unit="", ge=-100, le=100, help="position of the mark, rad or m")
+    turn: float = quantity(2.0 * math.pi, unit="", gt=0, le=1e3, help="travel from mark to mark, rad or m")
 
     @model_validator(mode="after")
     def _fits(self) -> "MissedCountsSettings":
         if len(self.more) >= MOST:
-            raise ValueError(f"more: {len(self.more)} further jumps are too many; {MOST - 1} is the most")
+            raise ValueError(f"more: {len(self.more)} further jumps are too many; use at most {MOST - 1}")
         return self
 
 
@@ -141,7 +141,7 @@ class ScaleSettings(Settings):
 
     term: Literal["sensor.scale"] = "sensor.scale"
     node: Node
-    relative: float = quantity(unit="", ge=-0.9, le=10, help="the reading is 1 + relative times too large")
+    relative: float = quantity(unit="", ge=-0.9, le=10, help="share by which the reading is too large")
 
 
 class ScaleParams(NamedTuple):
@@ -178,7 +178,7 @@ MISSED_COUNTS = Term(
     },
     stands=(stand("sensor", "position"),),
     look_alikes={
-        "transmission.slip": "drive to a hard stop and back: slip comes with force, lost counts with nothing",
+        "transmission.slip": "drive to a hard stop and back: slip comes with force, lost counts do not",
         "load.bump": "pass the place ten times: a bump comes back to zero error, lost counts add up",
         "guide.dirt": "pass the place ten times: dirt comes back to zero error, lost counts add up",
         "sensor.scale": "there and back: a scale error comes back to zero, lost counts stay",
@@ -232,7 +232,7 @@ RECTIFIED = Term(
     phrase=Phrase(
         noun="a sensor without direction",
         head="{here} cannot tell direction",
-        detail="{share:%} of the way back counts as way out",
+        detail="{share:%} of the backward motion counts as forward motion",
         need=BOTH,
     ),
     check=(
@@ -258,21 +258,21 @@ SCALE = Term(
         stand("sensor", "speed"),
     ),
     look_alikes={
-        "transmission.creep": "the same travel at two loads: creep grows with the load, a factor does not",
-        "transmission.slip": "the same travel hard and gently: slip comes with force, a factor always",
-        "sensor.missed_counts": "there and back: a factor comes back to zero, lost counts stay",
-        "sensor.rectified": "one move out and back: a factor ends at zero, a rectified reading at twice the way",
-        "guide.thickness": "travel over several wavelengths: a factor grows with the way, waves do not",
-        "guide.strip": "look for waves on top of the trend: a factor has none",
-        "geometry.radius_change": "two turns forth and two more: the factor stays, a growing reel goes with the square",
+        "transmission.creep": "the same travel at two loads: creep grows with the load, a scale error does not",
+        "transmission.slip": "the same travel hard and gently: slip comes with force, a scale error always",
+        "sensor.missed_counts": "there and back: a scale error comes back to zero, lost counts stay",
+        "sensor.rectified": "one move out and back: a scale error ends at zero, a rectified reading at twice the way",
+        "guide.thickness": "travel over several wavelengths: a scale error grows with distance, waves do not",
+        "guide.strip": "look for waves on top of the trend: a scale error has none",
+        "geometry.radius_change": "two turns forth and two more: the factor stays, a growing reel errs with the square",
     },
     typical={"relative": (1e-4, 5e-3)},
     axis="position",
     order=170,
     phrase=Phrase(
-        noun="a wrong factor",
-        head="{here} has a wrong factor",
-        detail="every way reads {relative:%} too {relative:long|short}",
+        noun="a wrong scale factor",
+        head="{here} has a wrong scale factor",
+        detail="every distance reads {relative:%} too {relative:long|short}",
         need="a second sensor to compare with",
     ),
     check=("Move by a known length and compare the reading; look at the counts per turn and the radius that were set."),

@@ -29,8 +29,8 @@ class SensorLagSettings(Settings):
 
     term: Literal["sensor.lag"] = "sensor.lag"
     node: Node
-    tau: float = quantity(unit="s", ge=0, le=10, help="how late it shows a steady motion")
-    order: Literal[1, 2] = Field(default=1, description="of the filter")
+    tau: float = quantity(unit="s", ge=0, le=10, help="delay of the reading of a steady motion")
+    order: Literal[1, 2] = Field(default=1, description="order of the filter")
     zeta: float = quantity(1.0, unit="", ge=0.05, le=20, help="damping of order 2")
 
 
@@ -87,8 +87,8 @@ SENSOR_LAG = Term(
     stands=(stand("sensor", "general position"), stand("sensor", "general speed")),
     look_alikes={
         "timing.delay": "two sensors on one body: a delay of the loop is late on both, a lag of one sensor on that one",
-        "drive.lag": "move it by hand with the power off: a sensor that lags still stays behind",
-        "sensor.scale": "stop and wait: a lag comes to the right value, a wrong factor does not",
+        "drive.lag": "move it by hand with the power off: a sensor that lags is still late",
+        "sensor.scale": "stop and wait: a lag ends at the right value, a wrong scale factor does not",
         "friction.viscous": "stop and wait, with a second sensor: friction moves both readings alike",
     },
     typical={"tau": (0.5, 5.0)},
@@ -99,8 +99,8 @@ SENSOR_LAG = Term(
     state=SENSOR_LAG_STATE,
     phrase=Phrase(
         noun="a reading that lags",
-        head="{here} reads late and soft",
-        detail="it follows with a time constant of {tau}",
+        head="{here} reads with a lag",
+        detail="its time constant is {tau}",
         need="quick moves, with a second sensor or a known command",
     ),
     check="Look for a filter in the sensor, its converter or the input card, and at the averaging that is set there.",

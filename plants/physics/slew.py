@@ -24,7 +24,7 @@ class SlewSettings(Settings):
 
     term: Literal["drive.slew"] = "drive.slew"
     node: Node
-    rate: float = quantity(unit="V/s", gt=0, le=1e9, help="the output changes no faster than this")
+    rate: float = quantity(unit="V/s", gt=0, le=1e9, help="largest rate of the output")
     tau: float = quantity(0.0, unit="s", ge=0, le=10, help="time constant of small steps; 0 for a sharp limit")
 
 
@@ -75,9 +75,9 @@ SLEW = Term(
     act={"command": "{m}.volts[{c}] = slew.slew({p}, {s}, {m}.volts[{c}])"},
     stands=(stand("drive", "general"),),
     look_alikes={
-        "drive.lag": "small and large steps: a lag takes the same time for both, a rate limit only spoils the large",
+        "drive.lag": "small and large steps: a lag takes the same time for both, a rate limit changes only large steps",
         "timing.delay": "small and large steps: a delay is the same time for both",
-        "drive.saturation": "hold a large command: a limit stays short of it, a rate limit gets there",
+        "drive.saturation": "hold a large command: a limit never reaches it, a rate limit does",
     },
     typical={"rate": (0.2, 0.9)},
     scale={"rate": "largest command"},

@@ -30,8 +30,8 @@ class ResonanceSettings(Settings):
 
     term: Literal["structure.resonance"] = "structure.resonance"
     node: Node
-    f_Hz: float = quantity(unit="", gt=0.1, le=5e3, help="natural frequency with the node held, in turns a second")
-    mass: float = quantity(unit="", ge=0, le=1e3, help="what swings, kg or kg m^2 by node")
+    f_Hz: float = quantity(unit="", gt=0.1, le=5e3, help="natural frequency with the node held, Hz")
+    mass: float = quantity(unit="", ge=0, le=1e3, help="attached mass, kg or kg m^2 by node")
     zeta: float = quantity(0.02, unit="", ge=0, lt=1, help="damping ratio")
 
 
@@ -76,13 +76,13 @@ class StiffeningSettings(Settings):
         unit="", ge=-1e15, le=1e15, help="cubic stiffness, N/m^3 or Nm/rad^3 by link; negative softens"
     )
     c2: float = quantity(
-        0.0, unit="", ge=-1e12, le=1e12, help="quadratic stiffness, N/m^2 or Nm/rad^2 by link; 0: both ways are alike"
+        0.0, unit="", ge=-1e12, le=1e12, help="quadratic stiffness, N/m^2 or Nm/rad^2 by link; 0: symmetric"
     )
     b2: float = quantity(
         0.0, unit="", ge=0, le=1e12, help="damping that grows with the bend squared, Ns/m^3 or Nms/rad^3 by link"
     )
-    power: float = quantity(2.0, unit="", ge=0.5, le=6, help="of the bend, by which the stiffness grows")
-    bend: float = quantity(1.0, unit="", gt=0, le=1e3, help="at which c3 is that of a cubic spring, m or rad by link")
+    power: float = quantity(2.0, unit="", ge=0.5, le=6, help="exponent of the bend in the stiffness")
+    bend: float = quantity(1.0, unit="", gt=0, le=1e3, help="bend at which c3 is that of the cubic, m or rad by link")
 
 
 class StiffeningParams(NamedTuple):
@@ -119,7 +119,7 @@ RESONANCE = Term(
     stands=(stand("body"),),
     look_alikes={
         "timing.delay": "a sweep through the frequency: a resonance has a dip and a peak, a delay only lags",
-        "drive.lag": "a sweep through the frequency: a lag falls off and never rings",
+        "drive.lag": "a sweep through the frequency: the gain of a lag only falls, it has no peak",
         "tape.viscoelastic": "let go and listen: a relaxing tape does not ring",
         "ripple.cogging": "two speeds: ripple moves with the speed, a resonance stays at its frequency",
     },
@@ -158,7 +158,7 @@ STIFFENING = Term(
     },
     stands=(stand("joint", "spring"),),
     look_alikes={
-        "tape.viscoelastic": "the same load slowly and fast: stiffening does not ask how fast",
+        "tape.viscoelastic": "the same load slowly and fast: stiffening does not depend on the speed",
         "transmission.backlash": "small motions about the middle: a gap is loose there, a cubic spring is linear",
         "load.spring": "sweep at two amplitudes: only with the cubic does the resonance move",
     },
@@ -167,7 +167,7 @@ STIFFENING = Term(
     axis="position",
     order=80,
     phrase=Phrase(
-        noun="a bent spring law",
+        noun="a nonlinear spring",
         head="the spring at {here} grows {c3:stiffer|softer} as it bends",
         detail="its cubic stiffness is {c3:+}",
         need="large deflections",

@@ -28,9 +28,9 @@ class ViscoelasticSettings(Settings):
     term: Literal["tape.viscoelastic"] = "tape.viscoelastic"
     node: Node
     c_branch: float = quantity(unit="N/m", ge=0, le=1e6, help="stiffness that relaxes")
-    tau: float = quantity(unit="s", gt=0, le=1e4, help="how long it takes to relax")
+    tau: float = quantity(unit="s", gt=0, le=1e4, help="time constant of the relaxation")
     c_branch2: float = quantity(0.0, unit="N/m", ge=0, le=1e6, help="stiffness of a second branch")
-    tau2: float = quantity(1.0, unit="s", gt=0, le=1e4, help="how long that one takes")
+    tau2: float = quantity(1.0, unit="s", gt=0, le=1e4, help="time constant of the second branch")
 
 
 class ViscoelasticParams(NamedTuple):
@@ -80,8 +80,8 @@ class SlackSettings(Settings):
 
     term: Literal["tape.slack"] = "tape.slack"
     node: Node
-    share: float = quantity(1.0, unit="", ge=0, le=1, help="of the push that is missing; 1: the tape cannot push")
-    other: float = quantity(1.0, unit="", ge=0, le=1, help="share of that on the other side of the capstan: one tape")
+    share: float = quantity(1.0, unit="", ge=0, le=1, help="share of the push that is missing; 1: the tape cannot push")
+    other: float = quantity(1.0, unit="", ge=0, le=1, help="factor of share on the other side of the capstan: one tape")
 
 
 class SlackParams(NamedTuple):
@@ -133,8 +133,8 @@ VISCOELASTIC = Term(
     order=90,
     state=VISCOELASTIC_STATE,
     phrase=Phrase(
-        noun="slow give",
-        head="{here} gives way slowly",
+        noun="slow relaxation",
+        head="{here} yields slowly",
         detail="a stiffness of {c_branch} relaxes within {tau}",
         need="changes of tension",
     ),
@@ -157,8 +157,8 @@ SLACK = Term(
     },
     stands=(stand("joint", "spring span"),),
     look_alikes={
-        "transmission.backlash": "the same moves at a higher tension: the tape stays taut, play stays",
-        "transmission.slip": "the same moves at a higher tension: slack goes, slip goes too but leaves a lost way",
+        "transmission.backlash": "the same moves at a higher tension: the tape stays taut, backlash stays",
+        "transmission.slip": "the same moves at a higher tension: both disappear, but slip leaves lost travel",
     },
     axis="tension",
     order=90,

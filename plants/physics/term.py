@@ -51,7 +51,7 @@ REMEDIES = {  # kind of remedy -> what it is; rtctl/improve/ makes each
     "observer": "disturbance observer",
     "sensor": "none in a law: the sensor is to be repaired",
 }
-Node = Annotated[str, Field(description="where it acts; `rtctl physics TERM` lists the nodes of each machine")]
+Node = Annotated[str, Field(description="place of the effect; `rtctl physics TERM` lists the nodes of each machine")]
 
 
 @dataclass(frozen=True)

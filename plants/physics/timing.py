@@ -30,7 +30,7 @@ class DelaySettings(Settings):
 
     term: Literal["timing.delay"] = "timing.delay"
     node: Node
-    extra: float = quantity(unit="s", ge=0, le=LONGEST, help="delay on top of what the loop is known to have")
+    extra: float = quantity(unit="s", ge=0, le=LONGEST, help="delay on top of the known delay of the loop")
 
 
 class DelayParams(NamedTuple):
@@ -75,7 +75,7 @@ class JitterSettings(Settings):
     node: Node
     sigma: float = quantity(unit="s", ge=0, le=0.01, help="standard deviation of the time of a tick")
     rate: float = quantity(500.0, unit="1/s", gt=0, le=1e5, help="ticks a second")
-    seed: int = Field(default=1, description="of the chance; the same seed, the same times")
+    seed: int = Field(default=1, description="seed of the random times; an equal seed gives equal times")
     form: Literal["gaussian", "uniform"] = Field(default="gaussian", description="distribution of the times")
 
 
@@ -153,7 +153,7 @@ DELAY = Term(
         "structure.resonance": "a sweep: a delay leaves the gain as it is",
         "friction.presliding": "tiny and large motions: a delay turns the phase of both alike",
         "tape.viscoelastic": "one motor with the tape off: a delay stays",
-        "transmission.backlash": "small and large reversals: a delay is the same time, backlash the same way",
+        "transmission.backlash": "small and large reversals: a delay is a constant time, backlash a constant distance",
     },
     typical={"extra": (0.3, 3.0)},
     scale={"extra": "sample period"},

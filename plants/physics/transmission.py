@@ -34,11 +34,11 @@ class BacklashSettings(Settings):
 
     term: Literal["transmission.backlash"] = "transmission.backlash"
     node: Node
-    gap: float = quantity(unit="", ge=0, le=1.0, help="total play, rad of the link's first end (m at an axis)")
+    gap: float = quantity(unit="", ge=0, le=1.0, help="total backlash, rad of the link's first end (m at an axis)")
     damping: float = quantity(0.0, unit="", ge=0, le=1, help="share of the link's damping that also acts in the gap")
     edge: float = quantity(0.005, unit="", ge=0, le=1, help="share of half the gap by which its edges are rounded")
     c: float = quantity(
-        0.0, unit="", ge=0, le=1e12, help="stiffness beyond the gap, of a joint that is said to be rigid"
+        0.0, unit="", ge=0, le=1e12, help="stiffness beyond the gap, of a joint that is described as rigid"
     )
 
 
@@ -167,8 +167,8 @@ BACKLASH = Term(
     ),
     look_alikes={
         "friction.presliding": "reverse with a small force: in a gap nothing pushes back, bristles do at once",
-        "drive.deadband": "push both ways against a stop: a dead band has no memory of the side that it came from",
-        "friction.stribeck": "reverse at several speeds: the lost way stays the same, the sticking time does not",
+        "drive.deadband": "push both ways against a stop: a dead band does not depend on the side it came from",
+        "friction.stribeck": "reverse at several speeds: the lost travel stays the same, the sticking time does not",
         "structure.stiffening": "load from zero to full: past the gap the stiffness is constant again",
     },
     typical={"gap": (2e-4, 4e-3)},
@@ -178,7 +178,7 @@ BACKLASH = Term(
     joint=joint,
     state=BACKLASH_STATE,
     phrase=Phrase(
-        noun="play",
+        noun="backlash",
         head="{here} has play",
         detail="{gap} is lost on each reversal",
         need="reversals",

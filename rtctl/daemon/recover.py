@@ -1,6 +1,6 @@
 """Recovery of the rows that a killed daemon left in shared memory: `rtctl trace recover NAME`.
 
-The segment of a dead daemon is renamed under the machine's lock, so that the next start need not wait. A segment is
+The segment of a dead daemon is renamed under the machine's lock, so that the next start does not wait. A segment is
 removed once its rows are on the disk.
 """
 
@@ -29,9 +29,9 @@ class Recovered(NamedTuple):
 
     def __str__(self) -> str:
         if self.ticks is None:
-            lacks = "it holds no row" if self.bundle is None else f"{self.bundle} lacks none of its rows"
+            lacks = "no rows in this segment" if self.bundle is None else f"{self.bundle} already has all its rows"
             return f"{self.segment}: {lacks}; removed"
-        own = f", a bundle of its own ({self.alone})" if self.alone else ""
+        own = f", in a separate bundle ({self.alone})" if self.alone else ""
         lost = f"{self.lost} rows are lost" if self.lost else "none is lost"
         return f"{self.bundle}: {self.rows} rows recovered, ticks {self.ticks[0]} to {self.ticks[1]}, {lost}{own}"
 
@@ -43,7 +43,7 @@ def recover(name: str, out: Path | None = None) -> tuple[list[Recovered], list[s
     Raises UserError where there is no segment, or only the segment of a running daemon.
     """
     if not NAME.fullmatch(name):
-        raise UserError(f"'{name}' is no machine's name: letters, digits, '_' and '-', at most 40")
+        raise UserError(f"'{name}' is no name of a machine; use letters, digits, '_' and '-', at most 40 characters")
     running: UserError | None = None
     try:
         with MachineLock(shared_memory.lock_path(name), name):
@@ -60,7 +60,7 @@ def recover(name: str, out: Path | None = None) -> tuple[list[Recovered], list[s
         except UserError as error:
             troubles.append(f"{error}; {segment} is kept")
         except OSError as error:
-            troubles.append(f"the disk did not take the rows of {segment}, which is kept: {error.strerror or error}")
+            troubles.append(f"the rows of {segment} cannot be written: {error.strerror or error}; the segment is kept")
     return done, troubles
 
 
@@ -89,7 +89,7 @@ def _bundle(left: leftover.Leftover, out: Path | None) -> Path | None:
 
 
 def _free(name: str, path: Path, out: Path | None) -> Path:
-    """Path of a folder that does not exist or is empty."""
+    """Path of a new or empty folder for the recovered rows."""
     when = datetime.fromtimestamp(path.stat().st_mtime).strftime("%Y%m%d-%H%M%S")
     base = out if out is not None else Path(f"{name}-recovered-{when}")
     folder, number = base, 2
@@ -99,6 +99,7 @@ def _free(name: str, path: Path, out: Path | None) -> Path:
 
 
 def _nothing(name: str) -> UserError:
+    """Error for a machine without a segment."""
     others = [other for other in shared_memory.names() if other != name]
     meant = nearest(name, others)
     hint = f"; did you mean '{meant}'?" if meant else f"; there is {', '.join(others)}" if others else ""

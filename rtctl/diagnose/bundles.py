@@ -27,12 +27,12 @@ def of_one_machine(bundles: Sequence[Path], together: bool) -> None:
     if len(set(groups.values()) | {""}) != 2:
         told = ", ".join(f"{bundle}: {group or 'none'}" for bundle, group in groups.items())
         raise UserError(
-            f"several recordings are one machine where their case.json names one group ({told}); give --together if "
-            "they are of one machine, else diagnose each by itself or the folder that holds them"
+            f"the recordings do not name the same group in case.json ({told}); give --together if they are of one "
+            "machine, else diagnose each alone, or the folder around them"
         )
     if "" in groups.values():
         bundle = next(bundle for bundle, group in groups.items() if not group)
-        raise UserError(f"{bundle}/case.json: group is missing, and the others have one; give --together if it belongs")
+        raise UserError(f"{bundle}/case.json: group is missing; write the group of the others, or give --together")
 
 
 def diagnose_into(

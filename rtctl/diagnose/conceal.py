@@ -37,7 +37,7 @@ def conceal(config: Any, seed: int) -> tuple[Any, dict[str, Any]]:
     names = [name for name in sorted(TERMS) if nodes(name, config)]
     if not names:
         raise UserError(
-            f"{config.name}: effects are hidden in machines that come with the program, not in a described one"
+            f"{config.name}: effects can be hidden only in a shipped machine (ivu, ldu, axis), not in a described one"
         )
     at = len(config.plant.physics)
     for _ in range(TRIES):

@@ -1,4 +1,4 @@
-"""Which faults are tried on which machine: at a moment, for a time and of a size that matter there."""
+"""Catalogue of faults by shipped machine, with begin, duration and size of each fault."""
 
 from typing import Any, NamedTuple
 
@@ -12,7 +12,7 @@ class Case(NamedTuple):
 
     fault: str
     channel: int = 0
-    size: float | None = None  # the usual one if None
+    size: float | None = None  # None: usual size of the fault
 
     @property
     def title(self) -> str:
@@ -20,30 +20,30 @@ class Case(NamedTuple):
 
 
 class Stand(NamedTuple):
-    """A shipped machine while it moves. Times in s from the first tick, which arms and plays."""
+    """Shipped machine with a motion. Times in s from the first tick, which arms and plays."""
 
     name: str
     reference: dict[str, Any]
-    begin: float  # of the fault, in the middle of a motion at constant speed
-    lasts: float  # longer than any limit of the config takes to trip
-    again: float  # reset, arm and play: the fault has gone
-    last: float  # the machine has moved again
-    move: float  # how far at least, rad or m
-    outputs: tuple[str, ...]  # columns
-    error: str
+    begin: float  # begin of the fault, in the middle of a motion at constant speed
+    lasts: float  # duration of the fault, longer than the time to any trip
+    again: float  # time of reset, arm and play, after the fault
+    last: float  # end of the run, after a further motion
+    move: float  # least travel of the further motion, rad or m
+    outputs: tuple[str, ...]  # columns of the outputs
+    error: str  # column of the following error
     cases: tuple[Case, ...]
 
     def ticks(self, seconds: float) -> int:
         return round(seconds * self.config().loop.rate)
 
     def config(self, faults: list[dict[str, Any]] | None = None, **changes: Any) -> Any:
-        """The shipped config with the motion and these faults; `changes` have __ for dots."""
+        """Shipped config with the motion and these faults; `changes` have __ for the dots of a path."""
         made = load_settings(find(self.name), machines.CONFIGS[self.name])
         values = {name.replace("__", "."): value for name, value in changes.items()}
         return set_paths(made, {"reference": self.reference, "faults": faults or [], "link.kind": "shm", **values})
 
     def fault(self, case: Case) -> dict[str, Any]:
-        """The case as an entry of `faults:`."""
+        """Entry of the case in `faults:`."""
         entry = {"fault": case.fault, "at": self.begin, "lasts": self.lasts, "channel": case.channel}
         return entry if case.size is None else {**entry, "size": case.size}
 

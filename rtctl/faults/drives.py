@@ -1,6 +1,6 @@
-"""Two ways to drive a machine through its run, tick by tick exact: inside this process, and as the daemon's processes.
+"""Two drivers of a run, exact to the tick: in this process, and as the processes of the daemon.
 
-Both stop before any tick that they are told to, so that an order reaches the loop at that very tick.
+Both stop before a given tick, so that an order reaches the loop at this tick.
 """
 
 import threading
@@ -19,7 +19,7 @@ from rtctl.loop.mailbox import Mailbox
 from rtctl.trace.bundle import load_bundle
 
 Write = Callable[[Any, Any], None]
-PATIENCE = 300.0  # s for a stretch of virtual time, on however busy a machine
+PATIENCE = 300.0  # s, time limit of a part of a run on a busy computer
 
 
 def again(_: Any, command: Any) -> None:
@@ -45,7 +45,7 @@ class Inside:
     def __enter__(self) -> "Inside":
         if self._lockstep:
             plant = Plant(*self._plant_arguments())
-            self._loop.warm()  # the emulator waits five seconds at most
+            self._loop.warm()  # compile before the start: the emulator waits at most five seconds
             self._plant = threading.Thread(target=plant.run)
             self._plant.start()
         return self
@@ -57,7 +57,7 @@ class Inside:
     def __exit__(self, *_: Any) -> None:
         if self._plant is not None:
             self._segment["plant_status"]["stop"] = 1
-            self.to(self._tick + 1)  # it waits for outputs
+            self.to(self._tick + 1)  # the emulator waits for outputs
             self._plant.join()
 
     @property
@@ -69,16 +69,16 @@ class Inside:
         self._loop.stretch(self._tick, tick - self._tick)
 
     def wire(self) -> list[int]:
-        """Codes that the machine has at its outputs."""
+        """DAC codes at the outputs of the machine."""
         return self._loop.held[0]["ao_codes"].tolist()
 
     def rows(self) -> Any:
-        """The rows so far, by column."""
+        """Rows up to now, by column."""
         return self._segment["rows"][: self._tick]
 
 
 class _Held(Supervisor):
-    """Waits before tick 1 until it is told how far to go."""
+    """Supervisor whose loop waits before tick 1 for a tick to run to."""
 
     def _start_children(self, stack: ExitStack, rows: int) -> None:
         self.status["hold"] = 1
@@ -86,7 +86,7 @@ class _Held(Supervisor):
 
 
 class Processes:
-    """Supervisor, loop and emulator as `rtctl run` has them; `out` takes the recording."""
+    """Supervisor, loop and emulator as processes of `rtctl run`; `out` is the folder of the recording."""
 
     def __init__(self, config: Any, ticks: int, out: Path):
         self._supervisor = _Held(config, out, ticks)
@@ -111,15 +111,15 @@ class Processes:
             if not self._supervisor.turn():
                 raise self._supervisor.failure or RuntimeError(f"the loop ended at tick {int(status['tick'])}")
             if time.monotonic() > deadline:
-                raise TimeoutError(f"the loop stands at tick {int(status['tick'])}, on its way to {tick}")
+                raise TimeoutError(f"the loop stopped at tick {int(status['tick'])} before tick {tick}")
             time.sleep(0.001)
 
     def wire(self) -> list[int]:
-        """Codes that the machine has at its outputs."""
+        """DAC codes at the outputs of the machine."""
         return self._supervisor.segment["outputs"][0]["frame"]["ao_codes"].tolist()
 
     def rows(self) -> Any:
-        """The recording, by column; nothing comes after that."""
+        """Rows of the recording, by column; ends the run."""
         self._supervisor.stop()
         self._supervisor.finish()
         return load_bundle(self._out).columns

@@ -1,4 +1,4 @@
-"""A fault played on a machine, and what came of it."""
+"""Run of a machine with a fault, and its outcome."""
 
 import math
 from typing import Any, NamedTuple
@@ -12,34 +12,34 @@ from rtctl.tick.faults import KINDS
 
 
 class Outcome(NamedTuple):
-    """What a fault did to a run. Ticks; None for what did not happen."""
+    """Outcome of a fault. Counts in ticks; None for an event that did not occur."""
 
     machine: str
     fault: str
     channel: int
     size: float
     trip: str | None
-    detected: int | None  # from the fault to the trip
-    safe: int | None  # from the fault until zero is written, and stays
-    safe_from_trip: int | None
-    wire: bool | None  # whether the machine had zeros at its outputs before the fault went; None where nothing tripped
-    error: float  # largest while the fault was there and nothing had tripped, rad or m
-    allowed: float
-    late: int  # ticks that were late
-    lost: int  # rows
-    same: bool  # bit for bit the undisturbed run, up to the fault
-    again: bool  # ran again, and moved, after reset and arm
+    detected: int | None  # ticks from the fault to the trip
+    safe: int | None  # ticks from the fault to the first of the lasting zeros at the outputs
+    safe_from_trip: int | None  # ticks from the trip to the lasting zeros
+    wire: bool | None  # whether the DAC had zeros before the end of the fault; None without a trip
+    error: float  # largest following error during the fault and before a trip, rad or m
+    allowed: float  # limit of the following error, rad or m
+    late: int  # late ticks
+    lost: int  # lost rows
+    same: bool  # whether all rows before the fault equal those of the undisturbed run, to the bit
+    again: bool  # whether the machine moved again after reset and arm
 
 
 def undisturbed(stand: Stand) -> Any:
-    """The rows of the run without a fault, bit for bit the same in every mode of virtual time."""
+    """Rows of the run without a fault, equal to the bit in every mode of virtual time."""
     with Inside(stand.config(loop__mode="fused"), stand.ticks(stand.last)) as drive:
         drive.to(stand.ticks(stand.last))
         return drive.rows().copy()
 
 
 def play(stand: Stand, case: Case, drive: Inside | Processes, truth: Any) -> Outcome:
-    """Play the run of a stand with a fault in its config; `truth` are the rows of the undisturbed run."""
+    """Outcome of the run of a stand with a fault in its config; `truth` are the rows of the undisturbed run."""
     begin, end = stand.ticks(stand.begin), stand.ticks(stand.begin + stand.lasts)
     restart, last = stand.ticks(stand.again), stand.ticks(stand.last)
     drive.to(end - 1)
@@ -74,20 +74,20 @@ def play(stand: Stand, case: Case, drive: Inside | Processes, truth: Any) -> Out
 
 
 def same(rows: Any, truth: Any, ticks: int) -> bool:
-    """Whether the first `ticks` rows are bit for bit those of the undisturbed run, every column."""
+    """Whether the first `ticks` rows equal those of the undisturbed run in every column, to the bit."""
     return len(rows["tick"]) >= ticks and all(
         np.array_equal(rows[name][:ticks], truth[name][:ticks], equal_nan=True) for name in truth.dtype.names
     )
 
 
 def _quiet(stand: Stand, rows: Any, first: int, end: int) -> int:
-    """Ticks from `first` until zero is written and stays until `end`."""
+    """Number of ticks from `first` to the lasting zeros at the outputs before `end`."""
     on = np.any([np.asarray(rows[name][first:end]) != 0.0 for name in stand.outputs], axis=0)
     return int(np.flatnonzero(on)[-1]) + 1 if on.any() else 0
 
 
 def _runs(stand: Stand, rows: Any, restart: int, last: int) -> bool:
-    """Whether the machine runs to the end and has moved since the restart, as its reference has."""
+    """Whether the machine runs to the end and has followed its reference since the restart."""
     moved = np.ptp(np.asarray(rows["ref"][restart:last]) - np.asarray(rows[stand.error][restart:last]))
     following = math.fabs(float(rows[stand.error][last - 1])) < stand.config().safety.following_error
     return bool(rows["state"][last - 1] == safety.RUNNING and moved > stand.move and following)

@@ -1,4 +1,4 @@
-"""Faults of processes, on those of the daemon: each has its run, or a part of one, that proves it was survived."""
+"""Faults of the processes of the daemon. A run, or a part of a run, proves that the daemon survives each fault."""
 
 import signal
 import subprocess
@@ -26,8 +26,8 @@ from rtctl.tick.memory import Segment
 from rtctl.trace.bundle import load_bundle
 from rtctl.trace.repair import repair
 
-PATIENCE = 120.0  # s, of a busy machine
-NO_LIMITS = {  # on the wall clock of a busy machine nothing but the fault may trip
+PATIENCE = 120.0  # s, time limit on a busy computer
+NO_LIMITS = {  # on the wall clock of a busy computer only the fault may trip
     "safety__link_timeout": 3.0, "safety__missed_ticks": 0, "safety__following_error": 0.0, "safety__frozen_time": 0.0,
     "safety__current_time": 0.0, "safety__disagreement": 0.0, "safety__tension_min": -1e9, "safety__tension_max": 1e9,
     "loop__realtime": "off",
@@ -35,14 +35,14 @@ NO_LIMITS = {  # on the wall clock of a busy machine nothing but the fault may t
 
 
 class Survived(NamedTuple):
-    """A fault of a process, in words that its run has proved where `ok`."""
+    """Fault of a process and its consequences in words, proved by the run where `ok`."""
 
     machine: str
     fault: str
     mode: str
-    seen: str  # where a person sees it
-    outputs: str
-    lost: str
+    seen: str  # place where a person sees the fault
+    outputs: str  # consequence for the outputs
+    lost: str  # lost rows
     ok: bool
 
 
@@ -55,7 +55,7 @@ def _running(config: Any, out: Path, ticks: int) -> Iterator[Supervisor]:
 
 
 def side_by_side(stand: Stand, folder: Path, truth: Any) -> list[Survived]:
-    """Recorder, disk, clock and CPUs, one after the other in one run in lockstep: none of them may reach the loop."""
+    """Faults of recorder, disk, clock and CPUs in one run in lockstep; no fault may reach the loop."""
     third, last = stand.last / 3, stand.ticks(stand.last)
     faults = [
         {"fault": "recorder.stall", "at": 0.5 * third, "lasts": third},
@@ -93,7 +93,7 @@ def side_by_side(stand: Stand, folder: Path, truth: Any) -> list[Survived]:
 
 
 def plant_killed(stand: Stand, folder: Path, truth: Any) -> Survived:
-    """In lockstep there is no time without the plant: the run ends, and says why."""
+    """Killed plant in lockstep: time stops without the plant, and the run ends with a reason."""
     begin = stand.ticks(stand.begin)
     made = config(stand, [{"fault": "plant.kill", "at": stand.begin}])
     with _running(made, folder / "bundle", stand.ticks(stand.last)) as supervisor:
@@ -109,7 +109,7 @@ def plant_killed(stand: Stand, folder: Path, truth: Any) -> Survived:
 
 
 def plant_back(stand: Stand, folder: Path, link: str = "shm") -> Survived:
-    """On the wall clock the loop trips, the plant comes back with its counters at zero, and is taken up again."""
+    """Killed plant on the wall clock: the loop trips, and runs again with a new plant whose counters begin at zero."""
     made = config(
         stand, [{"fault": "plant.kill", "at": 1.0, "lasts": 4.0}], loop__mode="real", link__kind=link, **NO_LIMITS
     )
@@ -117,7 +117,7 @@ def plant_back(stand: Stand, folder: Path, link: str = "shm") -> Survived:
         turns, status = supervisor.run(), supervisor.status
         first = supervisor.plant
         until(lambda: status["trip"] and supervisor.plant is not first, turns)
-        until(lambda: supervisor.last_row["link_age"] == 0.0, turns)  # the new one answers
+        until(lambda: supervisor.last_row["link_age"] == 0.0, turns)  # the new plant answers
         came = int(status["tick"])
         until(taken_up(supervisor, stand.ticks(1.0)), turns)
         moving = int(status["tick"]) + stand.ticks(1.0)
@@ -142,7 +142,7 @@ def _back(stand: Stand, rows: Any, came: int, limit: int) -> bool:
     off = slice(k, on)
     return bool(
         safety.TRIPS[int(rows["trip"][k])][0] == "link_lost"
-        and rows["link_age"][k - 1] <= limit < rows["link_age"][k]  # periods: a late tick may pass several
+        and rows["link_age"][k - 1] <= limit < rows["link_age"][k]  # link_age in periods: a late tick may skip several
         and not any(rows[name][off].any() for name in stand.outputs)
         and rows["tick"][on] >= came
         and rows[stand.error][on] == 0.0
@@ -155,7 +155,7 @@ def _limit(config: Any) -> int:
 
 
 def supervisor_killed(stand: Stand, folder: Path, truth: Any) -> Survived:
-    """SIGKILL: what the recording lacks is in shared memory, to the last tick."""
+    """Killed supervisor (SIGKILL): the rows that the recording lacks are in shared memory, to the last tick."""
     begin = stand.ticks(stand.begin)
     made = config(stand, [{"fault": "supervisor.kill", "at": stand.begin}])
     path, bundle = folder / "config.yaml", folder / "bundle"
@@ -175,7 +175,7 @@ def supervisor_killed(stand: Stand, folder: Path, truth: Any) -> Survived:
 
 
 def _left(config: Any) -> Any:
-    """The rows in the shared memory of a machine whose supervisor was killed, once its loop has ended; removed then."""
+    """Rows in the shared memory of a killed supervisor after the end of its loop; the segment is removed."""
     machine = machines.build(config)
     made = generate.generate(machine, "shm")
     rows = max(int(config.record.seconds * machine.rate), 1000)
@@ -198,8 +198,10 @@ def config(stand: Stand, faults: list[dict[str, Any]], **changes: Any) -> Any:
 
 
 def taken_up(supervisor: Supervisor, patience: int) -> Callable[[], bool]:
-    """Whether the loop runs again. It is told to reset and arm, and again wherever it has been tripped for `patience`
-    ticks since: a busy machine may lose the link once more before it moves."""
+    """Predicate that resets and arms a tripped loop, and is true once the loop runs.
+
+    The order is repeated after `patience` ticks: a busy computer may lose the link once more before the machine moves.
+    """
     status, asked = supervisor.status, -patience
 
     def running() -> bool:
@@ -214,8 +216,8 @@ def taken_up(supervisor: Supervisor, patience: int) -> Callable[[], bool]:
 
 
 def until(what: Callable[[], Any], turns: Iterator[None]) -> None:
-    """Take turns until it has come about. Raises UserError where it does not."""
+    """Take turns until `what` is true. Raises UserError at the end of the run or of PATIENCE."""
     deadline = time.monotonic() + PATIENCE
     while not what():
         if next(turns, turns) is turns or time.monotonic() > deadline:
-            raise UserError("the run ended before what was waited for came about")
+            raise UserError("the run ended, or timed out, before the awaited event")

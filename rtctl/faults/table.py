@@ -1,4 +1,4 @@
-"""The table run: every fault on the shipped machines, one after the other."""
+"""Run of the table of faults: every fault on the shipped machines, one after the other."""
 
 import tempfile
 from collections.abc import Callable, Sequence
@@ -13,21 +13,23 @@ from rtctl.faults.processes import Survived
 
 
 class Table(NamedTuple):
+    """Outcomes of all faults."""
+
     outcomes: list[Outcome]
     survived: list[Survived]
 
     @property
     def ok(self) -> bool:
-        """Nothing lost before a fault, every machine runs again, and every trip writes zero at once."""
+        """Whether no row before a fault is lost, every machine runs again, and every trip writes zero at once."""
         return all(o.lost == 0 and o.same and o.again and o.safe_from_trip in (0, None) for o in self.outcomes) and all(
             s.ok for s in self.survived
         )
 
 
 def run(names: Sequence[str], say: Callable[[str], None] = lambda _: None, inside: bool = False) -> Table:
-    """Every fault on the stands of these names, on loops and emulators in lockstep, as processes of the daemon.
+    """Table of every fault on the stands of these names, in lockstep, with the processes of the daemon.
 
-    With `inside` those at the loop's boundary are played in this process, in turns between two threads.
+    With `inside` the faults between loop and machine run in this process, in two threads that take turns.
     """
     outcomes, survived = [], []
     with tempfile.TemporaryDirectory(prefix="rtctl-faults-") as scratch:
@@ -40,7 +42,7 @@ def run(names: Sequence[str], say: Callable[[str], None] = lambda _: None, insid
 
 
 def boundary(stand: Stand, folder: Path | None, say: Callable[[str], None] = lambda _: None) -> list[Outcome]:
-    """Faults between loop and machine: with a `folder` for recordings as processes, else inside this one."""
+    """Outcomes of the faults between loop and machine: as processes that record into `folder`, else in this process."""
     truth, out = undisturbed(stand), []
     last = stand.ticks(stand.last)
     for case in stand.cases:
@@ -56,7 +58,7 @@ def boundary(stand: Stand, folder: Path | None, say: Callable[[str], None] = lam
 
 
 def of_processes(stand: Stand, folder: Path, say: Callable[[str], None] = lambda _: None) -> list[Survived]:
-    """Faults of processes, each run in a folder of its own."""
+    """Outcomes of the faults of processes; each run has its own folder."""
     truth, out = undisturbed(stand), []
     folders = [folder / name for name in ("side_by_side", "plant_killed", "plant_back", "supervisor_killed")]
     for each in folders:

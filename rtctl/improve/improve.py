@@ -67,7 +67,7 @@ def improve(
     for remedy in trial.plan:
         progress(f"trying {remedy.title} against {remedy.against}")
         tried.append(trial.of(remedy))
-    progress("checking all that were kept together")
+    progress("checking all kept remedies together")
     made = set_paths(config, written(trial.values, data_of(config)))
     after = played.play(made if written_too else trial.config({}), config, trial.seconds, judge, trial.asked)
     if after.figures.tripped or after.figures.rms > trial.before.figures.rms:

@@ -146,16 +146,16 @@ def _missing(file: str, path: Path) -> str:
 
     beside = [p.name for p in path.parent.glob("*.py") if p.exists()] if path.parent.is_dir() else []
     near = nearest(path.name, beside)
-    where = f"no such file in {path.parent.resolve()}, which is where the config's own path leads"
+    where = f"no such file in {path.parent.resolve()}, to which the path in the config leads"
     return f"{file}: {where}" + (f"; did you mean '{near}'?" if near else "; `rtctl new law NAME` writes one")
 
 
 def load(source: Source) -> ModuleType:
-    """Module of a text, run once in each process. Raises OwnError with the line that fails."""
+    """Module of a source, executed once in each process. Raises OwnError with the line that fails."""
     name = source.module
     if not is_trusted(source.text):
         raise ForeignError(
-            f"{source.file}: its text came with the data, and rtctl runs no code that comes with data; read it and "
+            f"{source.file}: this code came with the data, and rtctl runs no code that comes with data; read it and "
             f"give the file by path: --own {source.file} (sha256 {_sha256(source.text)[:16]}...)"
         )
     if name in sys.modules:

@@ -29,16 +29,16 @@ class Moves(NamedTuple):
 
 
 SLOWEST = 12.0
-JUMP = 0.1  # of the usual travel, of steps
+JUMP = 0.1  # of the usual travel, size of a step
 SHORTEST, LONGEST = 0.5, 4.0  # s between two setpoints
-RESTS = 2.0  # s of a rest, on the average
+RESTS = 2.0  # s, mean duration of a rest
 
 
 def usual(config: Any) -> Moves:
     """Moves of a machine in ordinary use, by its profile. Raises ValueError where the profile has no moves."""
     duty = profile_of(config.kind).duty
     if duty is None:
-        raise ValueError(f"{config.name}: nobody says what this machine does in ordinary use")
+        raise ValueError(f"{config.name}: no moves are known for a machine of kind {config.kind}")
     return Moves(0.5 * duty.travel, duty.speed, JUMP * duty.travel)
 
 

@@ -162,8 +162,8 @@ def _interrupt(*_: Any) -> None:
 
 
 STATES = {
-    "waiting": "waits for motion, from which the model is begun",
-    "learning": "learns how far the healthy machine is from its model; leave it as it is and let it move",
+    "waiting": "waits for motion, from which the model starts",
+    "learning": "learns the deviations of the healthy machine from its model; change nothing and let the machine move",
     "watching": "watches",
     "astray": "the model diverges from the rows repeatedly and cannot judge the machine; check the description of the "
     "machine with `rtctl diagnose`",

@@ -71,7 +71,7 @@ def test_check_reports_mistakes_in_a_described_machine(rtctl, key, message):
 
 def test_described_machine_does_not_support_hidden_effects(rtctl, tmp_path):
     code, _, err = rtctl("plant", "belt", "--conceal", "3", "--seal", tmp_path / "seal.json")
-    assert code == 2 and "effects are hidden in machines that come with the program" in err
+    assert code == 2 and "effects can be hidden only in a shipped machine" in err
 
 
 def load_path(name):

@@ -172,7 +172,7 @@ def test_diagnose_has_a_help_text(rtctl):
 def test_progress_bar_restarts_with_each_recording():
     said = ["recording 25 s", "preflight", "fitting the nominal parameters", "screening 60 hypotheses",
             "fitting a:b", "screening 3 hypotheses beside a:b", "fitting a:b + c:d", "look-alikes of a:b",
-            "predicting rows that were not fitted", "writing the results"]  # fmt: skip
+            "predicting the held-out rows", "writing the results"]  # fmt: skip
     done = [0.0]
     for text in said:
         done.append(diagnose_console.onward(done[-1], text))

@@ -125,7 +125,7 @@ def test_diverging_model_is_reported(rtctl, bundle, model, tmp_path):
     (tmp_path / "m.yaml").write_text(yaml.safe_dump(data))
     code, out, err = rtctl("simulate", tmp_path / "m.yaml", bundle, "--open-loop")
     assert (code, out) == (3, "")
-    assert "the model ran away at tick" in err
+    assert "the model diverged at tick" in err
 
 
 @pytest.mark.parametrize(

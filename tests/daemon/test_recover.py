@@ -197,7 +197,7 @@ def test_recovery_waits_for_a_running_loop_and_then_refuses(tmp_path: Path, monk
 
 @pytest.mark.parametrize("name", ["../ivu", "*", ""])
 def test_machine_name_that_is_a_path_is_refused(name: str) -> None:
-    with pytest.raises(UserError, match="is no machine's name"):
+    with pytest.raises(UserError, match="is no name of a machine"):
         recover(name)
 
 

@@ -77,7 +77,7 @@ def test_report_is_shown_in_a_cell_and_saved(answered, tmp_path, monkeypatch):
 
 def test_several_recordings_need_the_argument_together(answered, tmp_path):
     folders = [bundle(tmp_path / name) for name in "ab"]
-    with pytest.raises(rtctl.UserError, match="several recordings are one machine"):
+    with pytest.raises(rtctl.UserError, match="the recordings do not name the same group"):
         rtctl.diagnose(*folders)
     rtctl.diagnose(*folders, together=True, progress=False)
     assert answered == [tuple(folders)]
@@ -97,7 +97,7 @@ def test_notebook_progress_bar_moves_and_is_cleared(monkeypatch):
     monkeypatch.setattr(api_progress, "_notebook", lambda: display)
     with api_progress.stages(True) as stage:
         stage("screening every <hypothesis>")
-        stage("predicting rows that were not fitted")
+        stage("predicting the held-out rows")
     assert "every &lt;hypothesis&gt;" in shown[0] and "<progress value='0." in shown[0]
     assert shown[-1] == ""
 

@@ -70,14 +70,14 @@ class GraphDiagnosis(NamedTuple):
         """Verdict in one or two sentences."""
         machine, model = self.record.case.machine, self.decided.best.model
         if self.verdict == NOTHING:
-            return "Nothing is missing that this recording shows: the description follows it down to the noise."
+            return "Nothing is missing that this recording can show: the description agrees with it down to the noise."
         number = self.decided.best.space.doubted
         if self.verdict == UNNAMED and number:
             return words.wrong_number(self.record, number, self.nominal[number], model.base[number])
         if self.verdict == UNNAMED:
             at = self.located
             where = f" at {words.here(machine, at.node)}, by {at.axis}" if at is not None else ""
-            return f"Something is missing{where}, and no name of the library explains it."
+            return f"Something is missing{where}, and no effect of the library explains it."
         sure = [words.clause(machine, e, model) for e in self.effects if e.confidence >= SURE]
         if self.verdict == NAMED:
             text = "; ".join(sure)
@@ -156,19 +156,19 @@ def diagnose_record(*records: GraphRecord, progress: Progress = lambda _: None) 
     with threadpool_limits(1):  # threads of linear algebra slow down small matrices
         like, space = together(records)
         if any(part.sim.record.edges for part in like.parts):  # a model under the observer decodes their directions
-            progress("telling the directions of edges")
+            progress("decoding the directions of edges")
             like = like.directed(refit(like, space).model)
         found = search(likelier(like, space), space, progress)
         other = suits(found.best)
         if other is not None:
-            progress("taking the commands the other way between their samples")
+            progress("changing the shape of the command between its samples")
             found = search(other, space, progress)
-        progress("weighing names against wrong numbers and forces without a name")
+        progress("comparing named effects with wrong numbers and forces without a name")
         found = found._replace(doubts=doubted(found))
         decided = filled(verdict(found), found.base)
-        progress("predicting rows that were not fitted")
+        progress("predicting the held-out rows")
         heldout, best = predict(found.base, decided.best, decided.verdict in (NAMED, AMBIGUOUS))
-        decided = borne_out(fewer(decided, best, "the last rows are predicted better"), heldout)
+        decided = borne_out(fewer(decided, best, "the held-out rows are predicted better"), heldout)
         decided, heldout, numbers = told(decided, heldout, found)
         effects = _effects(decided, numbers)
         if len(left(decided)) > 1:

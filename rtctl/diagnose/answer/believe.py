@@ -37,6 +37,6 @@ def check_believed(record: GraphRecord) -> None:
     for name, words in of_case(source.case).needed().items():
         if name in estimated:
             raise UserError(
-                f"{source.case.file}: parameters.{name} is missing, {words}; without it there is no belief to "
-                "simulate, only a model that was fitted"
+                f"{source.case.file}: parameters.{name} is missing ({words}); add it: without it there is no nominal "
+                "model to simulate, only a fitted one"
             )

@@ -114,7 +114,7 @@ def _with_unit(value: float, unit: str) -> float | str:
 def _head(model: GraphModel, record: GraphRecord) -> str:
     """Comment lines on top of the file."""
     seconds = len(record.t) * record.dt
-    lines = [f"The machine as a recording of {seconds:.3g} s shows it: numbers of `machine` are fitted,"]
+    lines = [f"The machine fitted to a recording of {seconds:.3g} s: numbers of `machine` are fitted,"]
     lines.append("effects that were found are in plant.physics. Changed, nominal -> fitted:")
     lines += [
         f"  {path}: {old:.4g} -> {value:.4g} {unit}".rstrip() for path, old, value, unit in changed(model, record)

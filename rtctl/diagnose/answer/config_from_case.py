@@ -52,16 +52,16 @@ def _law(model: Model, case: Case, dt: float) -> tuple[dict[str, Any], list[str]
         return changes | more, left
     if isinstance(law, SectionsLaw) and len(law.sections) <= sections.MOST:
         changes["law.position"] = {"kind": "sections", "sections": [_biquad(s) for s in law.sections]}
-        return changes, ["the start of the law: ours begins where the machine stands, with its shaper and limits"]
+        return changes, ["the start of the law: rtctl begins where the machine stands, with its shaper and limits"]
     if isinstance(law, CascadeLaw):
         gains = {"gain": digits(law.kp * law.kv), "velocity_gain": law.kv}
         changes["law.position"] = {"kind": "pi_velocity", **gains}
-        return changes, ["the law to the last bit: its speed is that of the mean of two readings"]
+        return changes, ["the law to the bit: the recorded law takes the speed from the mean of two readings"]
     stand_in = exchange_of(case.plant).stand_in
     if stand_in is None:
         return changes, [_unknown(case)]
     position, hertz = stand_in(model.base, dt)
-    return changes | {"law.position": position}, [f"{_unknown(case)}; a cascade of {hertz:.3g} Hz stands in its place"]
+    return changes | {"law.position": position}, [f"{_unknown(case)}; a cascade of {hertz:.3g} Hz replaces it"]
 
 
 def _with_tape(law: TapeLaw) -> tuple[dict[str, Any], list[str]]:
@@ -82,7 +82,7 @@ def _with_tape(law: TapeLaw) -> tuple[dict[str, Any], list[str]]:
     left = ["the law to the last bit: tension is ramped up, and the shaper of the shipped config rounds off steps"]
     if friction:
         left.append(
-            "friction compensation by the sign of the reference's step: ours goes from motor to motor with speed"
+            "friction compensation by the sign of the reference's step: rtctl goes from motor to motor with speed"
         )
     return changes, left
 

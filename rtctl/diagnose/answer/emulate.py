@@ -113,7 +113,7 @@ def _obey(loop: Loop, bundle: Bundle, config: dict[str, Any], told: dict[int, Or
     if not number:
         return
     if number not in told:
-        raise NoAnswer(f"order {number} is not in the journal: the loop cannot be closed as the recording's was")
+        raise NoAnswer(f"order {number} is not in the journal: the closed loop of the recording cannot be repeated")
     changed = {path: value for n in range(1, number + 1) if n in told for path, value in told[n].changed.items()}
     if changed:
         generate.fill(loop.p[0], _machine(bundle, config, changed).diagram.blocks)

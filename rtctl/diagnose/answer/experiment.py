@@ -68,10 +68,10 @@ def planned(record: GraphRecord, decided: Verdict) -> Planned:
     try:
         found = design(record, rivals, decided.best)
     except NoAnswer as error:
-        return Planned(untold=f"{told} cannot be told apart by a motion: {error}.")
+        return Planned(untold=f"{told} cannot be separated by a motion: {error}.")
     if found.nats[found.name] < CLEAR:
         tried = ", ".join(name.replace("_", " ") for name in found.nats)
-        return Planned(untold=f"{told} cannot be told by any of these motions: {tried}.")
+        return Planned(untold=f"{told} cannot be separated by any of these motions: {tried}.")
     return Planned(found)
 
 
@@ -176,15 +176,15 @@ class Bench:
     def trouble(self, out: np.ndarray, volts: np.ndarray, limits: Limits, first: float) -> str:
         """Reason why a motion cannot be run on the machine; "" where it can."""
         if not np.isfinite(out).all():
-            return "a rival runs away"
+            return "a rival model diverges"
         most = float(np.abs(volts).max())
         if most > limits.command:
             unit = limits.command_unit
-            return f"it takes {nice(most, unit)}, and {nice(limits.command, unit)} are the most"
+            return f"it needs {nice(most, unit)}, and the limit is {nice(limits.command, unit)}"
         x = self.loop.per_unit * (out[:, self.sim.column(self.loop.sensor)] - first)
         room = OVER * (limits.high - limits.low)
         if x.min() < limits.low - room or x.max() > limits.high + room:
-            return "a rival leaves the travel"
+            return "a rival model leaves the travel"
         return ""
 
     def judge(self, sim: Simulator) -> Likelihood:

@@ -38,7 +38,7 @@ def missing_force(d: GraphDiagnosis) -> Figure:
         else:
             _curves(ax, d, runs, term, node, axis)
         at = here(runs.machine, node)
-        title = f"{noun(term)} at {at}" if term else f"what is left at {at}"
+        title = f"{noun(term)} at {at}" if term else f"missing at {at}"
         ax.set_title(title, color=INK, fontsize=10, loc="left", pad=22)
         legend(ax, ncols=4, loc="lower left", bbox_to_anchor=(-0.01, 0.98), columnspacing=1.2, handlelength=1.6)
     return figure
@@ -113,7 +113,7 @@ def _spectrum(ax, runs: Missing, term: str, node: str) -> None:
     y, rest = c.y[runs.rows], (c.y - c.law)[runs.rows]
     size = min(len(y), max(256, round(4 * rate)))
     scale, shown = prefixed(np.array([np.std(y)]), c.y_unit)
-    for values, color, text in ((y, BEFORE, "missing without it"), (rest, AFTER, "left with it")):
+    for values, color, text in ((y, BEFORE, "missing without the effect"), (rest, AFTER, "missing with the effect")):
         f, p = welch(values, rate, nperseg=size)
         ax.loglog(f[1:], scale * np.sqrt(p[1:]), color=color, lw=1.0, label=text)
     ax.tick_params(which="both", colors=INK, labelsize=8.5)
@@ -127,7 +127,7 @@ def heldout(d: GraphDiagnosis) -> Figure:
     late = d.heldout.late.parts[0]
     sim, record = late.sim, late.sim.record
     names = sim.channels
-    first = "before" if d.decided.best.names else "the description, fitted"
+    first = "before" if d.decided.best.names else "fitted description"
     models = [(first, d.heldout.models[0], BEFORE), ("after", d.heldout.models[1], AFTER)]
     models = models[: 2 if d.heldout.models[1].terms != d.heldout.models[0].terms else 1]
     residuals = [(text, late.raw(m) / (late.least * np.sqrt(late.mean)), color) for text, m, color in models]
@@ -146,7 +146,7 @@ def heldout(d: GraphDiagnosis) -> Figure:
             worst = max(worst, float(np.abs(e[:, c]).max()))
         ax.axhspan(-2, 2, color=NOISE, alpha=0.3, lw=0)
         ax.set_ylim(-1.1 * worst, 1.1 * worst)
-        label(ax, "", "in noise", f"Residual of {here(record.case.machine, names[c])}")
+        label(ax, "", "residual / noise", f"Residual of {here(record.case.machine, names[c])}")
         legend(ax, ncols=2, loc="lower right", bbox_to_anchor=(1.0, 0.97))
     axes[-1].set_xlabel("time, s", color=INK, fontsize=9.5)
     return figure
@@ -185,7 +185,7 @@ def runner_up(d: GraphDiagnosis) -> Figure | None:
     ax.bar(lost.edges[:-1], lost.nats, np.diff(lost.edges), align="edge", color=colors, edgecolor="none")
     ax.axhline(0, color=SEEN, lw=0.8)
     ax.set_xlim(lost.edges[0], lost.edges[-1])
-    label(ax, "time, s" if len(d.records) == 1 else "share of the rows of all recordings", "nats for the answer")
+    label(ax, "time, s" if len(d.records) == 1 else "share of the rows of all recordings", "gain of the answer, nats")
     return figure
 
 
@@ -217,7 +217,7 @@ def parameters(d: GraphDiagnosis) -> Figure | None:
     ax.set_yticks(range(len(names)), names)
     ax.tick_params(axis="y", labelsize=8.5)
     ax.invert_yaxis()
-    label(ax, "fitted over nominal, %; grey band: the owner's tolerance")
+    label(ax, "deviation from nominal, %; grey band: tolerance")
     return figure
 
 

@@ -184,16 +184,16 @@ def _checked(data: dict[str, Any], model: type[Settings], where: str = "the mode
 def _head(model: Model, record: Record, own: bool, left: list[str], left_out: Sequence[str] = ()) -> str:
     """Comment lines on top of the file."""
     seconds = len(record.t) * record.dt
-    lines = [
-        f"The {model.kind} as a recording of {seconds:.3g} s shows it: plant.parameters and plant.physics are new."
-    ]
+    lines = [f"The {model.kind} fitted to a recording of {seconds:.3g} s: plant.parameters and plant.physics are new."]
     if own:
         lines.append("All else is as it was when the recording was made.")
     else:
-        lines.append("All else is from the recording's case.json and, where that is silent, from the shipped config.")
+        lines.append(
+            "All else is from case.json of the recording, and from the shipped config where case.json has no value."
+        )
     if left:
         lines += ["Not carried over:", *(f"- {words}" for words in left)]
     if left_out:
-        lines += ["Found, and left out since it does not predict:", *(f"- {words}" for words in left_out)]
+        lines += ["Found, but left out because it does not predict better:", *(f"- {words}" for words in left_out)]
     wrapped = [part for line in lines for part in textwrap.wrap(line, WIDTH, subsequent_indent="  ")]
     return "".join(f"# {line}\n" for line in wrapped)

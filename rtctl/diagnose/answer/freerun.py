@@ -48,7 +48,7 @@ def compare(record: GraphRecord, closed: bool | None = None, skip: int = 0, bund
     if closed and not known and not ticks:
         raise UserError(f"the loop cannot be closed: {_why(record, around.known)}; simulate it with --open-loop")
     if not 0 <= skip <= n - 2:
-        raise UserError(f"--skip {skip}: the recording has {n} rows, and at least two must be left")
+        raise UserError(f"--skip {skip}: the recording has {n} rows; leave at least two")
     if closed and ticks:
         assert bundle is not None  # ticks_again
         return _compared(sim, *emulate(bundle, record), True, skip)
@@ -60,7 +60,7 @@ def compare(record: GraphRecord, closed: bool | None = None, skip: int = 0, bund
     lost = np.flatnonzero(~np.isfinite(out).all(axis=1))
     if len(lost):
         k = int(lost[0])
-        raise NoAnswer(f"the model ran away at tick {k} ({record.t[k] - record.t[0]:.6g} s) in {NAMES[closed]}")
+        raise NoAnswer(f"the model diverged at tick {k} ({record.t[k] - record.t[0]:.6g} s) in {NAMES[closed]}")
     readings = {name: out[:, sim.column(name)] for name in (*sim.channels, *record.edges)}
     for name in record.edges:  # they count the motion in either direction
         readings[name] = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(readings[name])))])

@@ -57,7 +57,7 @@ class Experiment(NamedTuple):
         """Purpose in one sentence."""
         names = self.called
         told = " from ".join(names) if len(names) == 2 else f"{', '.join(names[:-1])} and {names[-1]} from each other"
-        return f"It tells {told}: what they predict is {nice(self.distance[self.name])} times the noise apart."
+        return f"It separates {told}: their predictions differ by {nice(self.distance[self.name])} times the noise."
 
     def as_dict(self) -> dict[str, Any]:
         """Experiment as in diagnosis.json."""

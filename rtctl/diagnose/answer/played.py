@@ -35,7 +35,7 @@ def text(data: dict[str, Any], experiment: dict[str, Any], names: Sequence[str],
         settings = kind.model_validate(fill(Shape(kind, model=kind), data))
         settings, seconds = playing(settings, experiment, seconds)
     except (OwnError, ValidationError) as error:
-        raise UserError(f"the config of the machine does not play the experiment: {error}") from None
+        raise UserError(f"the config of the machine cannot play the experiment: {error}") from None
     if not own:  # the whole machine is emulated: no real-time clock is needed
         settings = set_path(settings, "loop.mode", "fused")
     return _head(experiment, names, seconds, own) + PAIR.sub(r"- [\1, \2]", to_yaml(settings))
@@ -56,19 +56,19 @@ def _head(experiment: dict[str, Any], names: Sequence[str], seconds: float, own:
     why: dict[str, Any] = given if isinstance(given, dict) else {"words": given}
     told = [
         f"The experiment to run next. {experiment.get('words') or ''}",
-        why.get("words") or f"It tells {' from '.join(names)}.",
+        why.get("words") or f"It separates {' from '.join(names)}.",
         f"Put the machine where the recording began{room(experiment)}, run `{command(seconds)}` and diagnose that "
         "recording.",
     ]
     if not own:
         told.append(
-            "The recording is not ours, so what is here beside the reference is a stand-in for its controller: play "
-            "the reference on your own."
+            "rtctl did not make the recording. Everything in this file but the reference stands in for the recorded "
+            "controller: play the reference on your own controller."
         )
     lines = [line for words in told for line in wrapped(" ".join(str(words).split()))]
     distances = sorted(why.get("distance", {}).items(), key=lambda item: -item[1])
     if distances:
-        lines.append("Expected distance between the rivals, over the noise, of all motions that were tried:")
+        lines.append("Expected difference between the rival explanations, in units of the noise, by motion:")
         lines += [f"    {name:18} {value:.3g}" for name, value in distances]
         lines += [f"    {name:18} left out: {reason}" for name, reason in why.get("refused", {}).items()]
     return "".join(f"# {line}\n" for line in lines)

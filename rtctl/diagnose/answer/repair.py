@@ -58,12 +58,12 @@ def ready(config: Any, mode: str | None = None) -> Any:
         return config
     if not config.link.spawns:
         raise UserError(
-            f"{config.name}: it has no reference, and how far a machine may be moved is its owner's to say; "
-            "name one with --reference FILE"
+            f"{config.name}: it has no reference, and rtctl chooses no motion for a machine that it does not emulate; "
+            "give one with --reference FILE"
         )
     if profile_of(config.kind).duty is None:
         raise UserError(
-            f"{config.name}: it has no reference, and a description does not say how far its machine moves; name one "
+            f"{config.name}: it has no reference, and the description does not say how far the machine moves; give one "
             "with --reference FILE, or write `reference:` into the config"
         )
     return set_path(config, "reference", ordinary_reference(duty_of(config)))
@@ -123,10 +123,10 @@ def repair(
     try:
         again = diagnose(bundle, second, progress=progress)
     except (NoAnswer, UserError) as error:
-        progress(f"the experiment says nothing: {error}")
+        progress(f"the experiment supports no verdict: {error}")
         return Repair((bundle, second), (first,), tuple(trips))
     if trips[-1] and again.verdict != "named":
-        progress(f"the experiment ended with a trip ({trips[-1]}) and names nothing; the first diagnosis stands")
+        progress(f"the experiment ended with a trip ({trips[-1]}) and gave no name; the first diagnosis is kept")
         return Repair((bundle, second), (first,), tuple(trips))
     return Repair((bundle, second), (first, again), tuple(trips))
 

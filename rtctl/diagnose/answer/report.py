@@ -25,27 +25,27 @@ ONE_LINE = 36  # characters of an effect with its name that fit on one line of a
 MOST_RIVALS = 4  # look-alikes of one effect in the table
 PICTURES = {
     "missing": (figures.missing_force, {
-        "": "What it takes to keep the simulation without the effect on the recorded track, by the axis where the "
-            "effect lives: means with their 95 % bands, and what the effect that was found gives instead.",
-        UNNAMED: "What it takes to keep the simulation on the recorded track, or what the reading lacks, by the axis "
-                 "where it lives: means with their 95 % bands, and the free function that fits best.",
-        NOTHING: "What it takes to keep the simulation on the recorded track: means with their 95 % bands, which hold "
-                 "zero where nothing is missing.",
+        "": "Force or reading that the model without the effect lacks, along the axis of the effect: means with 95 % "
+            "bands. The line is the law that was found.",
+        UNNAMED: "Force or reading that the model lacks, along the axis on which it depends: means with 95 % bands. "
+                 "The line is the free function that fits best.",
+        NOTHING: "Force that the model lacks: means with 95 % bands. The bands contain zero where nothing is missing.",
     }),
     "heldout": (figures.heldout, {
-        "": "Residual of each sensor on rows that no fit saw, in units of the noise of its counts or steps. The grey "
-            "band holds 95 % of that noise.",
+        "": "Residual of each sensor on held-out rows, in units of the noise of its counts or steps. The grey band "
+            "contains 95 % of this noise.",
     }),
     "posterior": (figures.posterior, {
-        "": "Mean posterior over resampled segments. What has no name is a free function of one axis; 1e-9 is "
-            "how probable an answer is beside the first.",
+        "": "Posterior probability, mean over resampled segments. An effect without a name is a free function of one "
+            "axis. A number such as 1e-9 is the probability relative to the first answer.",
     }),
     "runner_up": (figures.runner_up, {
-        "": "What each part of the recording says for the answer, and below zero against it and for the next likeliest "
-            "one, in nats: 2.3 are ten to one.",
+        "": "Gain in log probability of the answer over the next likeliest one, by part of the recording. A part below "
+            "zero supports the next likeliest answer. 2.3 nats are odds of ten to one.",
     }),
     "parameters": (figures.parameters, {
-        "": "Fitted numbers over the nominal ones with 90 % intervals. A wrong number is not missing physics.",
+        "": "Deviation of the fitted numbers from the nominal ones, with 90 % intervals. A wrong number is not missing "
+            "physics.",
     }),
 }  # fmt: skip
 
@@ -54,7 +54,7 @@ MISSING = {
     NAMED: "What is missing, and the law that was found",
     AMBIGUOUS: "What is missing, and the likeliest law",
     UNNAMED: "What is missing, and the free function that fits best",
-    NOTHING: "What is left: no force with a pattern",
+    NOTHING: "What is missing: no force with a pattern",
 }
 
 
@@ -125,9 +125,10 @@ def summary(d: GraphDiagnosis) -> str:
     shown = [d.heldout.before, d.heldout.after, d.heldout.floor]
     floor = numbers.percent(shown[2])
     if not d.decided.best.names:
-        return f"Error on the part that was not fitted: {numbers.percent(shown[0])} of the motion; noise makes {floor}."
+        error = numbers.percent(shown[0])
+        return f"Error on rows that were not fitted: {error} of the motion; noise alone gives {floor}."
     one, two = (numbers.percent(x) for x in shown[:2])
-    return f"Error on the part that was not fitted: {one} of the motion before, {two} after; noise makes {floor}."
+    return f"Error on rows that were not fitted: {one} of the motion before, {two} after; noise alone gives {floor}."
 
 
 def effect_rows(d: GraphDiagnosis) -> list[tuple[str, ...]]:
@@ -202,7 +203,7 @@ def run_next(experiment: dict[str, Any]) -> list[str]:
         why["words"],
         f"Put the machine where the recording began{played.room(experiment)}, run "
         f"`{played.command(seconds)}` and diagnose both recordings together.",
-        f"Expected distance between the rivals by motion, over the noise: {far}.",
+        f"Expected difference between the rival explanations, in units of the noise, by motion: {far}.",
         *(f"{name.replace('_', ' ')}: left out, {reason}." for name, reason in why["refused"].items()),
     ]
 
@@ -213,7 +214,7 @@ def without_motion(d: GraphDiagnosis) -> list[str]:
         names = list(dict.fromkeys(e.name for e in d.effects))
         pairs = [(a, b) for a in names for b in names if b in TERMS[a].look_alikes]
         lines = [f"{noun(a)} or {noun(b)}: {TERMS[a].look_alikes[b]}" for a, b in pairs[:2]]
-        return lines or [f"To show {noun(n)}: {need(f'{n}:')}." for n in names]
+        return lines or [f"To show {noun(n)}, record {need(f'{n}:')}." for n in names]
     if d.verdict == UNNAMED and d.located is not None:
         at = words.here(d.record.case.machine, d.located.node)
         machine = d.record.case.machine
@@ -221,12 +222,12 @@ def without_motion(d: GraphDiagnosis) -> list[str]:
             b for b in machine.bodies if not machine.is_frame(b) and b not in {s.body for s in machine.sensors.values()}
         ]
         lines = [
-            f"The rest lives at {at}, by {d.located.axis}. Vary the {d.located.axis} there alone, slowly, both ways, "
-            "and keep all else as it is.",
+            f"The missing effect is at {at} and depends on the {d.located.axis}. Vary only the {d.located.axis} there, "
+            "slowly and in both directions.",
         ]
         if blind:
             at = words.here(machine, blind[0])
-            lines.append(f"A sensor at {at}, which has none, says on which side of its joints the effect acts.")
+            lines.append(f"A sensor at {at} would show on which side of its joints the effect acts.")
         return lines
     return []
 
@@ -284,6 +285,6 @@ def terminal(d: GraphDiagnosis) -> RenderableType:
     parts += [Text(line, style="dim") for line in instead(d)]
     if d.cannot_test:
         many = len(d.cannot_test)
-        text = f"{many} effect{'s' * (many > 1)} cannot be told from this recording; the report says what to record."
+        text = f"{many} effect{'s' * (many > 1)} cannot be tested with this recording; the report says what to record."
         parts.append(Text(text, style="dim"))
     return Group(*parts)

@@ -55,7 +55,7 @@ def sentence(d: GraphDiagnosis) -> str:
         return ""
     said = f"The next likeliest answer is {lost.other}."
     if lost.behind < CLOSE:
-        return f"{said} It is about as probable: the recording does not tell the two apart."
+        return f"{said} It is about as probable: the recording does not separate the two."
     digits = lost.behind / np.log(10.0)
     odds = f"10^{digits:.0f}" if digits > 4.0 else f"{np.exp(lost.behind):.0f}"
     said += f" On the recording as a whole the odds against it are {odds} to 1"
@@ -67,15 +67,15 @@ def when(lost: Lost, recordings: int) -> str:
     """Sentence on the parts of one recording in which the other answer lost most, or on its lower prior."""
     total = float(lost.nats.sum())
     if total < CLOSE:
-        return "The rows do not decide between them: it has more numbers, or less probable ones."
+        return "The rows do not decide between the two: the other answer has more numbers, or less probable ones."
     if recordings > 1:
         return ""
     order = np.argsort(-lost.nats)
     most = order[: int(np.searchsorted(np.cumsum(lost.nats[order]), HALF * total)) + 1]
     spans = [f"{lost.edges[a]:.3g} to {lost.edges[b + 1]:.3g} s" for a, b in runs(np.sort(most))]
     if len(spans) > 3:
-        return "It loses in many parts of the recording, a little in each."
-    return f"It loses half of that in the rows from {' and '.join(spans)}."
+        return "The evidence against it is spread over many parts of the recording."
+    return f"Half of the evidence against it is in the rows from {' and '.join(spans)}."
 
 
 def runs(numbers: np.ndarray) -> list[tuple[int, int]]:

@@ -20,7 +20,7 @@ def predicted(d: GraphDiagnosis, other: Path | str) -> GraphDiagnosis:
     """
     sim = Simulator(load(other))
     if len(d.found.like.parts) > 1:
-        raise UserError("--heldout goes with one recording; of several together the last part is held out")
+        raise UserError("--heldout needs one recording; leave it out: of several recordings the last part is held out")
     if sim.record.edges:
         sim = sim.directed(d.decided.best.model)
     check_same(d.record, sim.record)

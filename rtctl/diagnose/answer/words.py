@@ -126,7 +126,7 @@ def wrong_number(record: GraphRecord, path: str, believed: float, value: float) 
     unit = unit_in(record, path)
     return (
         f"The machine acts as if {path} were {nice(value, unit)} instead of {nice(believed, unit)}, which is beyond "
-        "its tolerance. Check that number; if it is right, look for what has the same effect."
+        "its tolerance. Check this number; if it is right, look for another cause of the same behaviour."
     )
 
 

@@ -55,7 +55,7 @@ def of_motion(found: Found) -> Verdict:
 
     def answer(kind: str, model: Fitted, why: str) -> Verdict:
         if kind == NOTHING and left > POOR:  # the most probable explanation may leave a large residual
-            kind, why = UNNAMED, f"the description leaves {100 * left:.0f} % of what a sensor shows; {why}"
+            kind, why = UNNAMED, f"the description leaves a residual of {100 * left:.0f} % of a sensor's signal; {why}"
         return Verdict(kind, model, (), (), ranked, free, beside, why, table)
 
     if nothing > 1.0 - SURE and nothing > unlisted:
@@ -68,23 +68,21 @@ def of_motion(found: Found) -> Verdict:
     alone = set(robust(table, best.names)) if nameless else set()
     whole = next((f for names, f in fits.items() if alone and set(names) == alone), None)
     if whole is not None and explained(found.base, whole) >= MOSTLY:
-        return of_names(answer(NAMED, whole, f"beside it {what}"))
+        return of_names(answer(NAMED, whole, f"besides, {what}"))
     stands = beside if nameless else best
     if not (nameless and free) and (seen := shown(found.base, stands)) < VISIBLE:
-        why = (
-            f"no explanation takes off more than {100 * seen:.0f} % of what is missing beyond the noise of the sensors"
-        )
+        why = f"no model explains more than {100 * seen:.0f} % of the residual or missing force beyond noise"
         return answer(NOTHING, found.base, why)
     if nameless:
-        also = f"beside {', '.join(beside.names)} " if beside.names else ""
+        also = f"beside {', '.join(beside.names)}, " if beside.names else ""
         return answer(UNNAMED, beside, f"{also}{what}")
     share = explained(found.base, best)
     if share < MOSTLY:
         bare = max((r for r in table if not r.fit.names), key=lambda r: r.merit)
-        why = f"{', '.join(best.names)} takes off {100 * share:.0f} % of what is missing"
+        why = f"{', '.join(best.names)} explains {100 * share:.0f} % of the residual beyond sensor noise"
         if bare.unlisted:
             return answer(UNNAMED, best, why)
-        return answer(NOTHING, found.base, f"{why}, and the rest is as noise of the sensors leaves it")
+        return answer(NOTHING, found.base, f"{why}, and the remaining residual agrees with sensor noise")
     return of_names(answer(NAMED, best, ""))
 
 

@@ -23,10 +23,10 @@ def told(decided: Verdict, heldout: Heldout, found: Found) -> tuple[Verdict, Hel
             break
         rest = refit(decided.best.like, *without(decided.best, index))
         if found.merit(rest) < found.merit(found.base) + FIRST:
-            why = f"{', '.join(rest.names)} shows beside {decided.best.names[index]} alone, whose size may be zero"
+            why = f"{', '.join(rest.names)} counts only beside {decided.best.names[index]}, whose size may be zero"
             gone = decided._replace(verdict=NOTHING, best=found.base, confidence=(), rivals=(), why=why)
             return gone, predicted(heldout, found.base), found.base
-        decided, heldout = fewer(decided, rest, "all is predicted as well"), predicted(heldout, rest)
+        decided, heldout = fewer(decided, rest, "the held-out rows are predicted as well"), predicted(heldout, rest)
         predictor = predictive(decided, heldout)
     return decided, heldout, predictor
 
@@ -36,5 +36,5 @@ def borne_out(decided: Verdict, heldout: Heldout) -> Verdict:
     if decided.verdict not in (NAMED, AMBIGUOUS) or not decided.best.names or heldout.gain > -WORSE:
         return decided
     names = ", ".join(decided.best.names)
-    why = f"with {names} the last rows are predicted worse than without, by {-heldout.gain:.3g} nats"
+    why = f"with {names} the held-out rows are predicted worse than without, by {-heldout.gain:.3g} nats"
     return decided._replace(verdict=UNNAMED, confidence=(), rivals=(), why=why)

@@ -164,12 +164,12 @@ def check_same(first: GraphRecord, second: GraphRecord) -> None:
         if one != two:
             raise UserError(
                 f"{second.case.file}: machine.{group} has {', '.join(sorted(two)) or 'none'}, and the first recording "
-                f"has {', '.join(sorted(one)) or 'none'}; a second recording is of the same machine"
+                f"has {', '.join(sorted(one)) or 'none'}; both recordings need the same machine"
             )
     if list(first.y) != list(second.y):
         raise UserError(
             f"{second.case.file}: the recording shows {', '.join(second.y)}, and the first {', '.join(first.y)}; "
-            "a second recording has the same sensors"
+            "both recordings need the same sensors"
         )
 
 
@@ -178,7 +178,7 @@ def _check_values(first: GraphRecord, other: GraphRecord, differ: set[str]) -> N
     if first.case.problem != other.case.problem:
         raise UserError(
             f"{other.case.file}: problem is {other.case.problem}, and {first.case.problem} in {first.case.file}; "
-            "recordings of one machine that are taken together are of one kind of problem"
+            "recordings that are diagnosed together need the same problem"
         )
     one, two = first.case.values, other.case.values
     for path in {**one, **two}:
@@ -187,6 +187,6 @@ def _check_values(first: GraphRecord, other: GraphRecord, differ: set[str]) -> N
         a, b = one.get(path, 0.0), two.get(path, 0.0)
         if not math.isclose(a, b, rel_tol=SAME):
             raise UserError(
-                f"{other.case.file}: {path} is {b:g}, and {a:g} in {first.case.file}; say per_recording: [{path}] in "
-                "both where it differs between recordings, else give one value"
+                f"{other.case.file}: {path} is {b:g}, and {a:g} in {first.case.file}; write per_recording: [{path}] "
+                "into both if the value differs between recordings, else the same value"
             )

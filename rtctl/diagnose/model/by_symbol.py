@@ -46,8 +46,8 @@ def owner_model(case: Case, record: "Record | None" = None) -> Model:
     if profile_of(case.plant).has(FREE_UNITS) and record is not None and not {"M", "K"} & set(base):
         words = of_case(case).needed()
         raise UserError(
-            f"{case.file}: neither parameters.M nor parameters.K is there, {words['M']} and {words['K']}; a recording "
-            "shows only their ratio, so one of them should be given (K: 1 takes the command itself for it)"
+            f"{case.file}: neither parameters.M nor parameters.K is there: {words['M']} and {words['K']}; a recording "
+            "shows only their ratio, so give one of them (with K: 1 the command is the force)"
         )
     if case.estimated and record is not None:
         found = guess(record, base)

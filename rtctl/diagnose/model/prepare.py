@@ -54,7 +54,7 @@ def ready(sim: "Simulator", model: GraphModel, mode: int | None = None, coarse: 
     p = np.zeros(1, _dtype(params))
     fill_record(p[0], params)
     if len(model.terms) > SLOTS:
-        raise UserError(f"physics: has {len(model.terms)} terms; {SLOTS} is the most that can be simulated")
+        raise UserError(f"physics: has {len(model.terms)} terms; at most {SLOTS} can be simulated")
     slots = np.zeros(1, k.slots)
     acting = [t for t in ordered(list(model.terms)) if TERMS[str(getattr(t, "term", ""))].act]
     same = model.layout is sim.layout or model.layout.machine.joints == sim.layout.machine.joints  # or with more gauges

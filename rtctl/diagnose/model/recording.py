@@ -101,7 +101,7 @@ def record_of(columns: dict[str, np.ndarray], case: GraphCase, path: Path) -> Gr
         names = " and ".join(f"'{d.column}'" for d in driven)
         raise NoAnswer(f"{path}: {names} never changes; the machine was not driven, so it supports no verdict")
     if not y:
-        raise NoAnswer(f"{path}: no sensor tells a direction; a diagnosis needs one position or speed that does")
+        raise NoAnswer(f"{path}: no sensor tells a direction; a diagnosis needs a position or speed with direction")
     first = next(iter(y))
     if np.ptp(y[first]) == 0.0:
         raise NoAnswer(f"{path}: column '{machine.sensors[first].column}' never changes; nothing moved")
@@ -159,7 +159,7 @@ def _check_problem(path: Path, record: GraphRecord) -> None:
         if own is not None and bodies[entry.body].coordinate == bodies[own].coordinate:
             raise UserError(
                 f"{record.case.file}: inputs.{name}.body: '{entry.body}' moves with the body of sensor {record.main}; "
-                "a position that is an input is that of another body, beyond a spring"
+                "give an input position of another body, behind a spring"
             )
     if problem not in HELD_PROBLEMS:
         return
@@ -167,10 +167,10 @@ def _check_problem(path: Path, record: GraphRecord) -> None:
     if record.main not in shown or shown[record.main].measures not in ("position", "speed"):
         raise NoAnswer(f"{path}: a {problem} problem needs the position or speed of a body, which no column shows")
     if problem == "kinematic" and sum(s.measures == "position" for s in shown.values()) < 2:
-        raise NoAnswer(f"{path}: a kinematic problem compares two positions at least; the recording shows one")
+        raise NoAnswer(f"{path}: a kinematic problem needs at least two positions; the recording has one")
     if problem == "static" and len(record.y) < 2:
         raise NoAnswer(
-            f"{path}: a static problem needs a measured force: a drive's column or a sensor of force or current"
+            f"{path}: a static problem needs a measured force: the column of a drive, or a sensor of force or current"
         )
 
 

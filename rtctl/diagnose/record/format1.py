@@ -89,7 +89,7 @@ def record_of(bundle: Bundle, case: Case) -> Record:
     if isinstance(bundle.case.get("config"), dict) and "state" in columns:
         rows = running(columns["state"])
         if rows.stop - rows.start < len(columns["t"]):
-            told = f"{bundle.folder / PARQUET}: rows {rows.start} to {rows.stop - 1} are taken, where the loop ran"
+            told = f"{bundle.folder / PARQUET}: rows {rows.start} to {rows.stop - 1} are used, in which the loop ran"
             case = case._replace(warnings=(*case.warnings, told))
         before = armed(columns["state"], rows.start)
         earlier = {name: values[before] for name, values in columns.items()}
@@ -213,7 +213,7 @@ def _readings(path: Path, columns: dict, case: Case, warnings: list[str]) -> dic
     for name, scale in exchange_of(case.plant).scales.items():
         said = getattr(case.sensors, scale.key)
         if name not in columns and scale.optional:
-            warnings += [f"{path} has no column '{name}', which sensors.{scale.key} speaks of"] if said else []
+            warnings += [f"{path} has no column '{name}', which sensors.{scale.key} describes"] if said else []
             continue
         raw[name] = _column(path, columns, name, "counts")
         if said is None:

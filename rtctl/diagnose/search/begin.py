@@ -51,7 +51,7 @@ def begun(like: Likelihood, space: Space, progress: Progress) -> Begun:
     base = restarted(base)
     told = clock(base, 0.0)
     if told.gain > 0.0:
-        progress("telling the times of the ticks")
+        progress("estimating the times of the ticks")
         held = refit(timed(base, told), space, base.x)
         if held.log_evidence > base.log_evidence + MORE:
             like, base = held.like, held

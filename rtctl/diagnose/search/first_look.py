@@ -16,7 +16,7 @@ def first_look(base: Fitted) -> str:
     over = np.sqrt(np.mean(base.e**2, axis=0)) / floor(base)
     worst = int(np.argmax(over))
     if over[worst] <= 1.0:
-        return f"{WORD}: the fitted description follows every sensor down to its noise; forces are weighed next"
+        return f"{WORD}: the fitted description agrees with all sensors down to noise; missing forces are tested next"
     name = base.like.parts[0].sim.channels[worst]
-    far = f"{over[worst]:.2g} times as far from the fitted description as noise explains"
-    return f"{WORD}: something is missing: {name} is {far}"
+    far = f"the residual of {name} under the fitted description is {over[worst]:.2g} times its noise"
+    return f"{WORD}: something is missing: {far}"

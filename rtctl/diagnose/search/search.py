@@ -58,11 +58,11 @@ def search(like: Likelihood, space: Space, progress: Progress = lambda _: None) 
     for another bandwidth, the search is repeated.
     """
     usual = begun(like, space, progress)
-    progress("telling how quickly the observer follows")
+    progress("choosing the bandwidth of the observer")
     times, before = quicker(usual.order[0]), usual.order[:RIVALS]
     times = times if times > STEP else 1.0  # a second effect often explains a gain of one step
     found = under(usual if times == 1.0 else begun(like.following(times), space, progress), progress, before)
-    progress("telling how quickly the observer follows")
+    progress("choosing the bandwidth of the observer")
     best = found.best
     again = quicker(best if times == 1.0 else refit(like, best.space, best.x))
     if again == times or (min(again, times) > 1.0 and max(again / times, times / again) <= STEP):
@@ -94,18 +94,18 @@ def under(begin: Begun, progress: Progress, before: Sequence[Fitted] = ()) -> Fo
         looks = [screened(parent) for parent in parents]
         grown = extended(like, parents, known, NAMES[level - 1], merit, looks)
         if not any(adds(base, _parent(f, parents), f, merit) for f in grown):
-            progress(f"asking for other names of effect {level + 1}")
+            progress(f"trying other names for effect {level + 1}")
             grown += extended(like, parents, known, NAMES[level - 1], merit, looks, passed=[f.names for f in grown])
     for f in (f for f in before if key(f.names) not in known):
         known[key(f.names)] = again = refit(like, f.space, f.x)
         known |= {key(g.names): g for g in smaller(like, again, known)}
     for _ in range(EXCHANGES):
         best = leading(base, known, merit)[0]
-        progress(f"exchanging each of {', '.join(best.names)}")
+        progress(f"trying a replacement for each of {', '.join(best.names)}")
         exchanged(like, base, best, known, looked, merit)
         if leading(base, known, merit)[0] is best:
             break
-    progress("asking for other forms of what was found")
+    progress("trying other forms of the effects")
     enriched_near([f for f in leading(base, known, merit) if f.names], known, merit, asked)
     return Found(like, base, tuple(looked.scores), tuple(leading(base, known, merit)), odds)
 

@@ -16,19 +16,19 @@ from rtctl.trace.columns import Column, columns_of
 
 
 class Selection(NamedTuple):
-    """Selected columns (all if empty; `t` is always included) and rows."""
+    """Selection of columns (all if empty; `t` is always included) and rows."""
 
     columns: tuple[str, ...] = ()
-    start: float = -math.inf  # s of the column t
-    end: float = math.inf
-    every: int = 1  # keep the first row of each `every` rows, without a filter
+    start: float = -math.inf  # s, in the column t
+    end: float = math.inf  # s, in the column t
+    every: int = 1  # decimation: the first of each `every` rows, without a filter
 
 
 ALL = Selection()
 
 
 class Source:
-    """The selected rows of a bundle, all parts as one.
+    """Selected rows of a bundle, of all its parts.
 
     `columns` start with `t`, `rows` is the number of rows, `case` and `paths` belong to the bundle. Raises UserError
     for an unfinished or invalid bundle, a missing column, or an empty selection.
@@ -47,12 +47,12 @@ class Source:
 
     @property
     def name(self) -> str:
-        """Name of the machine in a file: ivu, ldu, axis."""
+        """Name of the machine for the file: ivu, ldu, axis."""
         return str(self.case.get("plant") or (self.case.get("config") or {}).get("name") or "trace")
 
     @property
     def started(self) -> datetime | None:
-        """Start of the recording with its time zone; None where the case has none."""
+        """Start of the recording with its time zone; None where the case has no start."""
         try:
             found = datetime.fromisoformat(str(self.case.get("recorded_at")))
         except ValueError:
@@ -68,7 +68,7 @@ class Source:
 
     @property
     def gaps(self) -> set[str]:
-        """Columns with missing values: null, not nan."""
+        """Names of the columns with missing values (null, not nan)."""
         found: set[str] = set()
         for path in self.paths:
             with _reading(path) as file:
@@ -76,13 +76,13 @@ class Source:
                     columns = file.metadata.row_group(group)
                     for n in range(columns.num_columns):
                         one = columns.column(n)
-                        if one.statistics is None or one.statistics.null_count != 0:  # None: nulls were not counted
+                        if one.statistics is None or one.statistics.null_count != 0:  # None: no count of nulls
                             found.add(one.path_in_schema)
         return found
 
     @property
     def rate(self) -> float | None:
-        """Rate of the selection in Hz, from the case; None where the clock is uneven."""
+        """Sample rate of the selection, Hz, from the case; None where the clock is uneven."""
         rate = self.case.get("sample_rate")
         return rate / self._selection.every if isinstance(rate, int | float) and rate > 0 else None
 
@@ -92,7 +92,7 @@ class Source:
         return self._first, self._last
 
     def batches(self, names: Sequence[str] | None = None) -> Iterator[pa.RecordBatch]:
-        """The selected rows, at most ROW_GROUP at a time; `names` for some of the columns."""
+        """Batches of the selected rows, at most ROW_GROUP rows each; `names` selects columns."""
         wanted = [column.name for column in self.columns] if names is None else list(names)
         s = self._selection
         schema = pa.schema([self.schema.field(name) for name in wanted])
@@ -110,12 +110,12 @@ class Source:
                         yield pa.record_batch(arrays, schema=schema)
 
     def arrays(self) -> Iterator[dict[str, np.ndarray]]:
-        """The selected rows in batches of arrays by name; nan where a value was not measured."""
+        """Batches of the selected rows as arrays by name; nan for a value that was not measured."""
         for batch in self.batches():
             yield {name: batch.column(name).to_numpy(zero_copy_only=False) for name in batch.schema.names}
 
     def column(self, name: str) -> np.ndarray:
-        """One column (rows,) as a whole."""
+        """Whole column (rows,) of the selection."""
         whole, at = np.empty(0), 0
         for batch in self.batches([name]):
             values = batch.column(0).to_numpy(zero_copy_only=False)
@@ -126,7 +126,7 @@ class Source:
         return whole
 
     def _schema(self, wanted: Sequence[str]) -> pa.Schema:
-        """Fields of the selection: `t`, then as in `wanted` or the file. A column of only nulls becomes doubles."""
+        """Schema of the selection: `t`, then `wanted` or all columns. A column of only nulls becomes doubles."""
         found = [_schema_of(path) for path in self.paths]
         for path, schema in zip(self.paths, found, strict=True):
             if not schema.equals(found[0]):
@@ -162,7 +162,7 @@ class Source:
 
 def _reading(path: Path) -> pq.ParquetFile:
     try:
-        return pq.ParquetFile(path, pre_buffer=False)  # pre_buffer would keep the whole file in memory
+        return pq.ParquetFile(path, pre_buffer=False)  # pre_buffer keeps the whole file in memory
     except (pa.ArrowException, OSError) as error:
         raise UserError(f"{path} cannot be read as Parquet: {str(error).splitlines()[0]}") from None
 

@@ -31,7 +31,7 @@ STEP = {"at": 0.5, "to": 0.02}
 SPRING = {"term": "load.spring", "node": "carriage", "k": 800.0}
 EXPERIMENT = {
     "words": "Crawl to and fro.",
-    "why": {"words": "It tells drive.lag from timing.delay."},
+    "why": {"words": "It separates drive.lag from timing.delay."},
     "reference": {"unit": "m", "knots": [[0.0, 0.0], [0.5, np.float64(0.02)]], "repeat": 2.0, "relative": True},
     "excitation": None,
     "seconds": 7.0,
@@ -159,7 +159,8 @@ def test_experiment_file_has_instructions_and_a_valid_config():
     file = experiment_text(diagnosis_with_models(AXIS, AXIS, EXPERIMENT))
     head = "".join(line for line in file.splitlines() if line.startswith("#"))
     assert any("`rtctl run experiment.yaml --for 7s`" in line for line in file.splitlines())  # one line to copy
-    assert "Crawl" in head and "drive.lag from timing.delay" in head and "--for 7s" in head and "not ours" in head
+    assert "Crawl" in head and "drive.lag from timing.delay" in head and "--for 7s" in head
+    assert "stands in for the recorded" in head
     assert "\n  - [0.5, 0.02]\n" in file  # one knot per line
     settings = CONFIGS["axis"].model_validate(yaml.safe_load(file))
     assert settings.reference.knots[1] == (0.5, 0.02)
@@ -211,7 +212,7 @@ def test_experiment_of_a_recorded_config_is_the_config(config):
     own = config("axis", set={"law.limit.high": 6.0}).model_dump(mode="json", exclude_unset=True)
     file = experiment_text(diagnosis_with_models(AXIS, AXIS, EXPERIMENT), own)
     settings = CONFIGS["axis"].model_validate(yaml.safe_load(file))
-    assert "not ours" not in file
+    assert "stands in for the recorded" not in file
     assert settings.law.limit.high == 6.0 and settings.name == own["name"]
 
 

@@ -29,7 +29,7 @@ def test_page_of_a_named_effect_is_self_contained():
 
 
 @pytest.mark.parametrize(
-    ("d", "words"), [(nothing, "What is left: no force with a pattern"), (unnamed, "Record this instead")]
+    ("d", "words"), [(nothing, "What is missing: no force with a pattern"), (unnamed, "Record this instead")]
 )
 def test_page_of_a_verdict_without_a_name(d, words):
     assert words in report.html(d())
@@ -67,7 +67,7 @@ def test_terminal_shows_verdict_size_and_held_out_error():
     text = said(named())
     assert "named" in text
     assert "F_C" in text
-    assert "Error on the part that was not fitted" in text
+    assert "Error on rows that were not fitted" in text
     assert "The verdict is unnamed" in said(unnamed())
 
 

@@ -44,11 +44,11 @@ def test_answer_among_the_rivals_matches_the_verdict(verdict, d):
 def test_sentence_names_the_decisive_rows():
     edges = np.arange(9.0)
     here = Lost("x", 0.0, 30.0, edges, np.array([0.0, 0.0, 10.0, 12.0, 0.5, 0.0, 8.0, 0.0]))
-    assert when(here, 1) == "It loses half of that in the rows from 2 to 4 s."
+    assert when(here, 1) == "Half of the evidence against it is in the rows from 2 to 4 s."
     even = here._replace(nats=np.full(8, 0.01))
     assert "do not decide" in when(even, 1)
     spread = here._replace(nats=np.array([5.0, 0.0, 5.0, 0.0, 5.0, 0.0, 5.0, 0.0]) + np.array([5.0, 0.0] * 4))
-    assert when(spread, 1) == "It loses half of that in the rows from 0 to 1 s and 2 to 3 s."
+    assert when(spread, 1) == "Half of the evidence against it is in the rows from 0 to 1 s and 2 to 3 s."
     assert when(here, 2) == ""
 
 
@@ -59,11 +59,11 @@ def test_adjacent_segments_form_one_run():
 def test_report_explains_the_runner_up():
     page = html(unnamed())
     assert "The next likeliest answer is" in page
-    assert "What each part of the recording says for the answer" in page
+    assert "Gain in log probability of the answer over the next likeliest one" in page
 
 
 def test_report_omits_the_segment_figure_without_evidence():
     assert not lost_by(named()).nats.any()
     page = html(named())
-    assert "The rows do not decide between them" in page
-    assert "What each part of the recording says for the answer" not in page
+    assert "The rows do not decide between the two" in page
+    assert "Gain in log probability of the answer over the next likeliest one" not in page

@@ -43,9 +43,9 @@ def test_verdict_names_the_removed_effect():
     d = named()
     best = d.decided.best
     more = best._replace(space=best.space.add(best.space.hypotheses[0]._replace(node="motor")))
-    found = fewer(d.decided._replace(best=more), best, "the last rows are predicted better")
+    found = fewer(d.decided._replace(best=more), best, "the held-out rows are predicted better")
     assert (found.verdict, found.best.names) == (NAMED, best.names)
-    assert found.why == "without friction.coulomb:motor, the last rows are predicted better"
+    assert found.why == "without friction.coulomb:motor, the held-out rows are predicted better"
     assert len(found.confidence) == 1
     assert fewer(d.decided, best, "") is d.decided
 

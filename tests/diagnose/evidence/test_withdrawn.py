@@ -26,7 +26,7 @@ def test_effect_compatible_with_size_zero_is_withdrawn():
     heldout, _ = predict(base, more)
     decided, again, _ = told(d.decided._replace(best=more), heldout, d.found)
     assert decided.best.names == best.names == again.fits[1].names
-    assert decided.why == "without drive.offset:amplifier, all is predicted as well"
+    assert decided.why == "without drive.offset:amplifier, the held-out rows are predicted as well"
 
 
 def test_effects_supported_only_together_are_withdrawn():
@@ -41,4 +41,4 @@ def test_effects_supported_only_together_are_withdrawn():
     assert decided.verdict == NOTHING
     assert decided.best is predictor is base
     assert again.fits[1].names == ()
-    assert "alone, whose size may be zero" in decided.why
+    assert "whose size may be zero" in decided.why

@@ -67,5 +67,5 @@ def test_assumed_stiffness_is_not_reported():
 
 def test_kinematic_problem_needs_two_positions():
     case = case_of(SCREW, RATE, problem="kinematic")
-    with pytest.raises(NoAnswer, match="compares two positions at least"):
+    with pytest.raises(NoAnswer, match="needs at least two positions"):
         record(case, turn=TURN)

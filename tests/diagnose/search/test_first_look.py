@@ -13,11 +13,11 @@ def look(terms):
 
 
 def test_first_look_reports_a_missing_effect():
-    assert "something is missing: encoder is" in look([RUB])
+    assert "something is missing: the residual of encoder" in look([RUB])
 
 
 def test_first_look_reports_a_residual_at_the_noise_level():
-    assert "down to its noise" in look([])
+    assert "down to noise" in look([])
 
 
 def test_console_prefix_matches_the_first_look():

@@ -27,7 +27,7 @@ def test_missed_counts_remain():
 
 
 def test_too_many_jumps_are_refused():
-    with pytest.raises(ValidationError, match="48 further jumps are too many; 47 is the most"):
+    with pytest.raises(ValidationError, match="48 further jumps are too many; use at most 47"):
         missed(more=((1.0, 1.0),) * 48)
     assert missed(more=((1.0, 1.0),) * 47)[0].n == 48
 
