@@ -14,7 +14,7 @@ from rich.text import Text
 
 STAGES = {  # first words of a stage's text -> share of the work done when the stage begins
     "recording": 0.0, "preflight": 0.02, "fitting the nominal": 0.04, "screening": 0.15, "fitting": 0.25,
-    "look-alikes": 0.6, "predicting": 0.9, "writing": 0.95,
+    "comparing": 0.6, "predicting": 0.9, "writing": 0.95,
 }  # fmt: skip
 FIRST = "first look"  # first words of a text of rtctl/diagnose/search/first_look.py, whose import takes seconds
 ONWARD = 0.12  # share of the remaining work, for a stage that repeats or is not in STAGES

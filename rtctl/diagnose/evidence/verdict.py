@@ -71,7 +71,7 @@ def of_motion(found: Found) -> Verdict:
         return of_names(answer(NAMED, whole, f"besides, {what}"))
     stands = beside if nameless else best
     if not (nameless and free) and (seen := shown(found.base, stands)) < VISIBLE:
-        why = f"no model explains more than {100 * seen:.0f} % of the residual or missing force beyond noise"
+        why = f"no model explains more than {100 * max(seen, 0.0):.0f} % of the residual or missing force beyond noise"
         return answer(NOTHING, found.base, why)
     if nameless:
         also = f"beside {', '.join(beside.names)}, " if beside.names else ""
