@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 from lateness import CONFIGS, rtctl_command
 
+from rtctl.daemon.shared_memory import segment_path
 from rtctl.loop.records import STATUS
 
 LIMIT = 300.0  # s
@@ -31,7 +32,7 @@ LIMIT = 300.0  # s
 def start(machine: str, link: str, folder: Path, cache: Path | None) -> float:
     """Time in s to the first tick of a short run. Raises RuntimeError without a tick."""
     name = f"start-{os.getpid()}"
-    segment = Path("/dev/shm") / f"rtctl-{os.getuid()}-{name}"
+    segment = segment_path(name)
     command = (
         *rtctl_command(), "run", str(CONFIGS / f"{machine}.yaml"), "--mode", "real", "--link", link, "--for", "0.5s",
         "--set", f"name={name}", "--json", "--no-plot", "--out", str(folder / f"bundle-{time.monotonic_ns()}"),
