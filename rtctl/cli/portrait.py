@@ -57,7 +57,7 @@ def number(value: float, span: float) -> str:
 
 
 def ends(values: np.ndarray) -> tuple[float, float]:
-    """Lowest and highest value; 1 apart where all values are equal, to the least number with all its digits."""
+    """Lowest and highest value; 1 apart where they differ by less than the smallest normal number."""
     low, high = float(values.min()), float(values.max())
     return (low, high) if high - low >= np.finfo(float).tiny else (low - 0.5, high + 0.5)
 

@@ -81,7 +81,7 @@ def _crossover(g: Ground) -> float:
 
 
 def _against(g: Ground) -> str:
-    return "what has no name" if g.found.unnamed else "what is left"
+    return "effect without a name" if g.found.unnamed else "residual error"
 
 
 def turn_of(config: Any) -> float | None:

@@ -8,8 +8,9 @@
 
 y is the measured position, K the acceleration for one unit of command, B the viscous friction over the inertia. The
 command that has acted since the last sample is the one written `delay` ticks before. `u_known` is the part of it with
-which a feedforward compensates known forces; no force is compensated twice. `u_beside` is what accelerates the machine
-beside the command, in volts of a positive command: a feedforward of inertia that goes to both motors of a tape.
+which a feedforward compensates known forces; no force is compensated twice. `u_beside` is the positive command that
+would accelerate the machine as the voltages outside the command do, such as an inertia feedforward to both motors of a
+tape.
 
 Source: Ohnishi, Shibata & Murakami, Motion control for advanced mechatronics, IEEE/ASME Trans. Mechatronics 1 (1996);
 gains of a critically damped filter by Brookner, Tracking and Kalman Filtering Made Easy (1998), 1.3 and 2.4.
@@ -82,16 +83,20 @@ def step(p, s, y):
 
 
 @tick
-def track(p, s, u_written, u_known, u_beside):
-    """Predict the next sample from the command written, its part against known forces, and what acts beside it, V.
+def pull(p, u):
+    """Acceleration by the command `u` in V, whose sign selects the drive."""
+    return (p.K if u > 0.0 else p.K_back) * u
 
-    The drive that a command pulls with is told by the sign of the command, not by that of what it leaves over.
+
+@tick
+def track(p, s, u_written, u_known, u_beside):
+    """Predict the next sample from the command written, its part against known forces, and `u_beside`, all in V.
+
+    The command and its part are accelerations of their own drives: the difference of both may have another sign.
     """
     for i in range(p.delay, 0, -1):
         s.a[i] = s.a[i - 1]
-    written = (p.K if u_written > 0.0 else p.K_back) * u_written
-    known = (p.K if u_known > 0.0 else p.K_back) * u_known
-    s.a[0] = written - known + p.K * u_beside
+    s.a[0] = pull(p, u_written) - pull(p, u_known) + p.K * u_beside
     a = s.a[p.delay] - p.B * s.v + s.d
     s.x += p.dt * (s.v + 0.5 * p.dt * a)
     s.v += p.dt * a

@@ -155,7 +155,7 @@ class Signals(NamedTuple):
     written: str  # output of the limit
     known: str  # V, friction compensation by the machine's own feedforward
     channel: dict[int, float]  # drive -> share of the command; empty where an allocation distributes the command
-    beside: str = "0.0"  # V of a positive command that accelerates like voltages outside the command
+    beside: str = "0.0"  # V, positive command that accelerates as the voltages outside the command do
 
 
 def lines(settings: CompensationSettings, names: Signals, kind: str, mechanics: Any, dt: float) -> Lines:

@@ -6,6 +6,7 @@ from typing import Any
 import fused
 import numpy as np
 import pytest
+from marks import long_where
 
 from rtctl import machines
 from rtctl.cli.common import load_config
@@ -97,9 +98,7 @@ def test_physics_term_can_act_at_any_body_but_not_at_a_spring():
         config("belt", plant__physics=[{"term": "friction.viscous", "node": "belt", "B": 1.0}])
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=pytest.mark.long) if name in COUPLED else name for name in EXAMPLES]
-)
+@pytest.mark.parametrize("name", long_where(COUPLED.__contains__, EXAMPLES))
 def test_halving_the_integration_step_changes_less_than_a_tenth_of_a_count(name):
     """Three seconds of a smooth command to every drive, scaled to the demand of its reference."""
     settings = config(name)

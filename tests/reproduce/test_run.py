@@ -1,11 +1,10 @@
 """Every row of the thesis in its short version, and every figure."""
 
 import re
-from collections.abc import Iterable
 from functools import cache
-from typing import Any
 
 import pytest
+from marks import long_where
 
 from rtctl.config.errors import UserError
 from rtctl.reproduce import figures, rows, run
@@ -16,13 +15,10 @@ FIGURES = [(i, number) for i, part in enumerate(PARTS) for number in part.figure
 LONG = ("3", "11", "12")  # chapters whose experiments run for more than 20 s
 
 
-def by_chapter(names: Iterable[str], *values: Iterable[int]) -> list[Any]:
-    """Parameters of a test, those of LONG chapters with their mark."""
-    marks = {True: [pytest.mark.long], False: []}
-    return [
-        pytest.param(*given, name, id=name, marks=marks[name.partition(".")[0] in LONG])
-        for name, *given in zip(names, *values, strict=True)
-    ]
+def is_long(row: str | tuple[int, str]) -> bool:
+    """Whether a row or figure, or (part, row), is of a chapter of LONG."""
+    name = row if isinstance(row, str) else row[1]
+    return name.partition(".")[0] in LONG
 
 
 WANTED = (
@@ -41,7 +37,7 @@ def drawn(i: int, number: str) -> rows.Picture:
     return PARTS[i].figures[number](True)
 
 
-@pytest.mark.parametrize(("i", "name"), by_chapter([name for _, name in NAMES], [i for i, _ in NAMES]))
+@pytest.mark.parametrize(("i", "name"), long_where(is_long, NAMES), ids=[name for _, name in NAMES])
 def test_row_has_the_expected_verdict(i, name):
     row = played(i)[name]
     assert row.verdict != "fail", (
@@ -49,7 +45,7 @@ def test_row_has_the_expected_verdict(i, name):
     )
 
 
-@pytest.mark.parametrize(("i", "number"), by_chapter([number for _, number in FIGURES], [i for i, _ in FIGURES]))
+@pytest.mark.parametrize(("i", "number"), long_where(is_long, FIGURES), ids=[number for _, number in FIGURES])
 def test_figure_is_drawn(i, number, tmp_path):
     picture = drawn(i, number)
     assert picture.number == number
@@ -112,7 +108,7 @@ CORRECTED = {  # verdict and measured value of rows corrected after the first ve
 }
 
 
-@pytest.mark.parametrize("name", by_chapter(CORRECTED))
+@pytest.mark.parametrize("name", long_where(is_long, CORRECTED))
 def test_corrected_row_keeps_its_verdict_and_value(name):
     (i,) = (i for i, row in NAMES if row == name)
     row = played(i)[name]
