@@ -9,6 +9,7 @@ from rtctl.cli import build
 def compiled(monkeypatch, tmp_path):
     """List of requested compilations; the cache is a temporary folder."""
     monkeypatch.setenv("RTCTL_CACHE_DIR", str(tmp_path))
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)  # it may hold the tick compiled by another test
     calls = []
     monkeypatch.setattr(build, "_compile", lambda machine, link: calls.append((machine.kind, link)))
     return calls
