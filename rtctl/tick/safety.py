@@ -246,7 +246,8 @@ def board_watchdog(s, rx, tx):
     """
     if s.state != ARMED and s.state != RUNNING:
         s.off_seq = tx.seq
-    if rx.watchdog != s.board:
+        s.board = rx.watchdog  # of an earlier run, or of outputs that were off
+    elif rx.watchdog != s.board:
         s.board = rx.watchdog
         if rx.watchdog_seq > s.off_seq:
             s.watchdog += 1
