@@ -1,7 +1,10 @@
 """PD position law with a filtered derivative.
 
-    d += a ((e - e_prev) / dt - d)        a = 1 - exp(-2 pi f dt), or 1 without a filter
+    d += a ((e - e_prev) / (n dt) - d)    a = 1 - exp(-2 pi f dt), or 1 without a filter
     u  = gain e + D d                     D = gain tau_d
+
+n periods have passed since the previous step: 1, or more after missed ticks. Without n, the motion of several periods
+would count as that of one, and the outputs would jump.
 
 The derivative acts on the error, as in the thesis, so a step of the reference gives a kick of gain tau_d a / dt per
 unit of step; the first step after a start or a reset gives none. A feedforward is added to what `step` returns.
@@ -62,12 +65,12 @@ def design(K_p: float, w_n: float, zeta: float = 1.0) -> tuple[float, float]:
 
 
 @tick
-def step(p, s, e):
-    """Command in V for the position error `e` (rad or m)."""
+def step(p, s, e, passed=1):
+    """Command in V for the position error `e` (rad or m), `passed` periods after the previous step."""
     if s.primed == 0:
         s.e = e
         s.primed = 1
-    s.d += p.a * ((e - s.e) / p.dt - s.d)
+    s.d += p.a * ((e - s.e) / (passed * p.dt) - s.d)
     s.e = e
     return p.gain * e + p.D * s.d
 

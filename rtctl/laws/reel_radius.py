@@ -128,7 +128,7 @@ def step(p, s, phi_c, n1_counts, n2_counts, passed=1):
     is the number of periods since the tick before; the time-out counts them.
     """
     middle = 0.5 * (s.velocity.x + phi_c)  # an edge came somewhere within the tick
-    v = velocity.step(p.velocity, s.velocity, phi_c)
+    v = velocity.step(p.velocity, s.velocity, phi_c, passed)
     s.ticks += passed
     s.T1 = _towards(s.T1, p.tension * s.R1 if s.R1 > 0.0 else p.T_max, p.slew)
     s.T2 = _towards(s.T2, p.tension * s.R2 if s.R2 > 0.0 else p.T_max, p.slew)

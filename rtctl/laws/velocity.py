@@ -1,6 +1,8 @@
 """Velocity estimate: backward difference of a position through a first-order low-pass.
 
-    v += a ((x - x_prev) / dt - v)        a = 1 - exp(-2 pi f dt), or 1 without a filter
+    v += a ((x - x_prev) / (n dt) - v)    a = 1 - exp(-2 pi f dt), or 1 without a filter
+
+n periods have passed since the previous step: 1, or more after missed ticks.
 
 One count of quantisation moves v by a count / dt, and the estimate lags by about dt / 2 + 1 / (2 pi f).
 
@@ -32,12 +34,15 @@ def build(settings: VelocitySettings, dt: float) -> VelocityParams:
 
 
 @tick
-def step(p, s, x):
-    """Velocity in units of `x` per second. The first step after a start or a reset gives 0."""
+def step(p, s, x, passed=1):
+    """Velocity in units of `x` per second, `passed` periods after the previous step.
+
+    The first step after a start or a reset gives 0.
+    """
     if s.primed == 0:
         s.x = x
         s.primed = 1
-    s.v += p.a * ((x - s.x) / p.dt - s.v)
+    s.v += p.a * ((x - s.x) / (passed * p.dt) - s.v)
     s.x = x
     return s.v
 

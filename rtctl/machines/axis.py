@@ -150,7 +150,7 @@ USES = (
 )
 LAW_SIGNALS = {
     "e": "y.position_error", "x": "y.x", "v": "y.speed", "ref": "y.ref", "v_ref": "s.shaper.speed",
-    "a_ref": "s.shaper.acceleration", "u": "y.u",
+    "a_ref": "s.shaper.acceleration", "u": "y.u", "passed": "passed",
 }  # fmt: skip
 TRACKED = {"u_wanted": "y.u_c", "u_written": "u"}
 TRUTH = (
@@ -207,7 +207,7 @@ def diagram(config: AxisConfig, dt: float) -> Diagram:
             "law",
             (
                 "y.position_error = y.ref - y.x",
-                "y.speed = velocity.step(p.velocity, s.velocity, y.x)",
+                "y.speed = velocity.step(p.velocity, s.velocity, y.x, passed)",
                 *position.step,
                 "changed = c.gains != s.machine.gains",
                 "s.machine.u_fb = bumpless.step(p.bumpless, s.bumpless, u_fb, changed, s.machine.u_fb)",

@@ -88,6 +88,7 @@ def diagram(config: Any, dt: float) -> Diagram:
     signals = {
         "e": "y.position_error", "x": "y.feedback", "v": rate, "ref": "y.ref", "v_ref": "s.shaper.speed",
         "a_ref": "s.shaper.acceleration", "u": f"p.machine.shares[{number}] * y.{column}",
+        "passed": "passed",
     }  # fmt: skip
     asked = "y.u_c" if law.compensation.inverse is None else "asked"
     position = own_law.lines(law.position, "u_fb", signals, {"u_wanted": asked, "u_written": "u"})
@@ -154,7 +155,7 @@ def diagram(config: Any, dt: float) -> Diagram:
             "law",
             (
                 f"y.position_error = y.ref{more.shift} - {more.closed or 'y.feedback'}",
-                f"{rate} = velocity.step(p.velocity, s.velocity, y.feedback)",
+                f"{rate} = velocity.step(p.velocity, s.velocity, y.feedback, passed)",
                 *(("y.speed = y.feedback",) if parts.is_speed else ()),
                 *position.step,
                 *more.filter,

@@ -10,6 +10,7 @@ COMMAND, TRACK = "<command>", "<compensation after the limits>"
 LAW_SIGNALS = {
     "e": "y.capstan_error", "x": "y.capstan", "v": "y.capstan_speed", "ref": "y.ref", "v_ref": "s.shaper.speed",
     "a_ref": "s.shaper.acceleration", "u": "y.u_c", "R1": "y.R1", "R2": "y.R2",
+    "passed": "passed",
 }  # fmt: skip
 WRITTEN = "min(max(y.u_c, p.limit.low), p.limit.high)"
 NAMES = compensation.Signals(
@@ -55,8 +56,8 @@ STAGES = (
             "reel_growth.step(p.machine, s.machine, y.capstan)",
             "y.R1 = s.machine.R1",
             "y.R2 = s.machine.R2",
-            "y.capstan_speed = velocity.step(p.velocity, s.velocity, y.capstan)",
-            "acceleration = velocity.step(p.velocity, s.acceleration, y.capstan_speed)",
+            "y.capstan_speed = velocity.step(p.velocity, s.velocity, y.capstan, passed)",
+            "acceleration = velocity.step(p.velocity, s.acceleration, y.capstan_speed, passed)",
             "tension_estimate.step("
             "p.tension_estimate, s.tension_estimate, y.u1, y.u2, y.capstan_speed, acceleration, y.R1, y.R2)",
             "y.tension1_estimate = s.tension_estimate.T1",

@@ -227,7 +227,7 @@ COLUMNS = (
 
 LAW_SIGNALS = {
     "e": "y.position_error", "x": "y.position", "v": "y.speed", "ref": "y.ref", "v_ref": "s.shaper.speed",
-    "a_ref": "s.shaper.acceleration", "u": "y.u",
+    "a_ref": "s.shaper.acceleration", "u": "y.u", "passed": "passed",
 }  # fmt: skip
 
 
@@ -279,7 +279,7 @@ def stages(config: LduConfig, more: compensation.Lines = compensation.NONE) -> t
             "law",
             (
                 f"y.position_error = y.ref{more.shift} - {more.closed or 'y.position'}",
-                "y.speed = velocity.step(p.velocity, s.velocity, y.position)",
+                "y.speed = velocity.step(p.velocity, s.velocity, y.position, passed)",
                 *law.step,
                 *more.filter,
                 "changed = c.gains != s.machine.gains",

@@ -275,5 +275,6 @@ def healthy(names: Any, dt: float, size: float) -> dict[str, np.ndarray]:
     known = {
         "ref": ref, "v_ref": v_ref, "a_ref": a_ref, "x": x, "e": ref - x, "v": size * w * np.cos(w * t - 0.02),
         "u": np.sin(w * t), "R1": np.full(TICKS, 0.038), "R2": np.full(TICKS, 0.022),
+        "passed": np.ones(TICKS),
     }  # fmt: skip
     return {name: known.get(name, 0.5 * np.sin(w * t)) for name in {*known, *names}}

@@ -23,6 +23,7 @@ SIGNALS = {  # name -> meaning; lengths in the unit of the machine's position, r
     "u": "voltage written in the tick before (ivu: command, before it is shared out), V",
     "R1": "radius of reel 1, m (ivu)",
     "R2": "radius of reel 2, m (ivu)",
+    "passed": "periods since the previous tick: 1, or more after missed ticks",
 }
 FUNCTIONS = {"step": "step(p, s, e)", "reset": "reset(p, s)"}
 RESULT = "the command in V"

@@ -71,6 +71,13 @@ def test_unfiltered_derivative_is_the_slope_of_a_ramp_at_once(zero):
     assert s.d == pytest.approx(3.0)
 
 
+def test_missed_ticks_do_not_multiply_the_derivative(zero):
+    s, slope = zero(pd.PD_STATE), 0.5
+    before = run(P, s, slope * np.arange(500) * DT)[-1]
+    after = pd.step(P, s, slope * 507 * DT, 8)
+    assert after == pytest.approx(before + P.gain * slope * 8 * DT, rel=1e-6)
+
+
 def test_pd_gain_units_follow_the_machine():
     assert pd.PdMetreSettings(gain="5 V/mm").gain == pytest.approx(5000.0)
     assert pd.PdSettings(gain=1.0, tau_d="160 ms").tau_d == pytest.approx(0.16)

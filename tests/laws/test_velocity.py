@@ -30,6 +30,14 @@ def test_filter_attenuates_the_velocity_step_of_one_count(zero):
     assert v.max() == pytest.approx(p.a * count / DT)
 
 
+@pytest.mark.parametrize("filter_hz", [None, 20.0])
+def test_speed_of_a_ramp_is_kept_over_missed_ticks(zero, filter_hz):
+    p = velocity.build(velocity.VelocitySettings(filter=filter_hz), DT)
+    s = zero(velocity.VELOCITY_STATE)
+    before = run(p, s, 3.0 * np.arange(300) * DT)[-1]
+    assert velocity.step(p, s, 3.0 * 307 * DT, 8) == pytest.approx(before, rel=1e-6)
+
+
 def test_reset_clears_the_last_position(zero):
     p = velocity.build(velocity.VelocitySettings(filter=10.0), DT)
     s = zero(velocity.VELOCITY_STATE)

@@ -39,3 +39,12 @@ def test_stall_in_lockstep_is_bit_exact_with_fused() -> None:
     fused, lockstep = stalled("fused", 0.01)[0], stalled("lockstep", 0.01)[0]
     assert all(np.array_equal(fused[n], lockstep[n], equal_nan=True) for n in fused.dtype.names)
     assert fused["t"][-1] == pytest.approx((len(fused) - 1 + 5) * 2e-3)
+
+
+def test_missed_ticks_do_not_multiply_speed_and_derivative() -> None:
+    """Eight missed ticks at 1.5 rad/s. The reference pauses, so that the command brakes; it must not jump to the limit,
+    as it would where the motion of nine periods counted as that of one."""
+    rows, k = stalled("fused", 8 * 2e-3 + 1e-4, safety__missed_ticks=20)
+    assert not rows["trip"].any() and rows["period"][k] == pytest.approx(0.018)
+    assert rows["capstan_speed"][k] == pytest.approx(rows["capstan_speed"][k - 1], rel=0.05)
+    assert np.abs(rows["u_c"][k : k + 20]).max() < 4.0

@@ -1,11 +1,13 @@
 """My law: a PD on the position error, with a filtered derivative.
 
-    d += a ((e - e_prev) / dt - d)        a = 1 - exp(-2 pi f dt)
+    d += a ((e - e_prev) / (n dt) - d)    a = 1 - exp(-2 pi f dt)
     u  = gain (e + tau_d d)
 
-e is the position error in rad, u the command in V; d is the derivative of e in rad/s. A tick takes dt s.
+e is the position error in rad, u the command in V; d is the derivative of e in rad/s. A tick takes dt s;
+n periods have passed since the previous one: 1, or more after missed ticks.
 
-The arguments of `step` after p and s select its signals by name: e, and any of x, v, ref, v_ref, a_ref, u.
+The arguments of `step` after p and s select its signals by name: e, and any of x, v, ref, v_ref, a_ref, u,
+passed.
 `rtctl check` reports a name that the machine does not have. Limits and trips act after this law; it cannot bypass them.
 """
 
@@ -42,12 +44,12 @@ def build(settings: MyLawSettings, dt: float) -> MyLawParams:
 
 
 @tick
-def step(p, s, e):
-    """Command in V for the position error `e` in rad."""
+def step(p, s, e, passed):
+    """Command in V for the position error `e` in rad, `passed` periods after the previous tick."""
     if s.primed == 0:
         s.e = e
         s.primed = 1
-    s.d += p.a * ((e - s.e) / p.dt - s.d)
+    s.d += p.a * ((e - s.e) / (passed * p.dt) - s.d)
     s.e = e
     return p.gain * (e + p.tau_d * s.d)
 

@@ -12,7 +12,7 @@ def commands(errors, **settings):
     p = my_law.build(my_law.MyLawSettings(**{"gain": 30.0, **settings}), DT)
     s = np.zeros(1, my_law.MY_LAW_STATE)[0]
     my_law.reset(p, s)
-    return np.array([my_law.step(p, s, float(e)) for e in errors])
+    return np.array([my_law.step(p, s, float(e), 1) for e in errors])
 
 
 def test_without_derivative_it_is_the_gain():
