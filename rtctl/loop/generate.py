@@ -91,8 +91,8 @@ def source(machine: Machine, link: str) -> str:
         _advance(plant.advance, machine.substeps),
         function("sample", "p, s, rx", "What the board reads now.", plant.sample),
     ]
-    parts += [copied(f) for f in (runner.post, runner.meet, runner.send, runner.account, runner.stages, runner.note_late)]
-    parts += [copied(f) for f in (runner.answer, runner.behind, runner.guard, runner.virtual)]
+    parts += [copied(f) for f in (runner.post, runner.meet, runner.send, runner.account, runner.stages)]
+    parts += [copied(f) for f in (runner.note_late, runner.answer, runner.behind, runner.guard, runner.virtual)]
     parts += [copied(f, "entry") for f in (runner.run_real, runner.run_lockstep, runner.run_fused)]
     parts += [copied(f, "entry") for f in (runner.plant_real, runner.plant_lockstep)]
     return "\n\n".join(part.strip("\n") + "\n" for part in parts)
