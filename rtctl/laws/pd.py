@@ -70,7 +70,10 @@ def step(p, s, e, passed=1):
     if s.primed == 0:
         s.e = e
         s.primed = 1
-    s.d += p.a * ((e - s.e) / (passed * p.dt) - s.d)
+    slope = (e - s.e) / p.dt
+    if passed != 1:  # a branch, as in `velocity`
+        slope /= passed
+    s.d += p.a * (slope - s.d)
     s.e = e
     return p.gain * e + p.D * s.d
 

@@ -42,7 +42,10 @@ def step(p, s, x, passed=1):
     if s.primed == 0:
         s.x = x
         s.primed = 1
-    s.v += p.a * ((x - s.x) / (passed * p.dt) - s.v)
+    slope = (x - s.x) / p.dt
+    if passed != 1:  # a branch, since one more division in every tick would cost a tenth of a fused run
+        slope /= passed
+    s.v += p.a * (slope - s.v)
     s.x = x
     return s.v
 
