@@ -1,13 +1,16 @@
 """Quantities as a person writes them: a number in SI, or a string with a unit.
 
-pint does the conversion. It is slow to load, so it is loaded only when a string needs it, and with the units of motion
-hardware alone. An angle is a dimension here and a hertz is a turn a second: 8 Hz is 50.3 rad/s, never 8 rad/s, and a
-gain in V is no gain in V/rad.
+pint does the conversion. It is slow to load, so it is loaded only for a unit that is new here (see factors.py), and
+with the units of motion hardware alone. An angle is a dimension here and a hertz is a turn a second: 8 Hz is
+50.3 rad/s, never 8 rad/s, and a gain in V is no gain in V/rad.
 """
 
+import hashlib
 import re
 from functools import lru_cache
 from typing import Any
+
+from rtctl.config.factors import factor
 
 QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*")
 NUMBER = r"^\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?"  # how a quantity starts, for JSON Schema
@@ -72,6 +75,13 @@ count = one = _ = counts
 """
 
 
+EDITION = hashlib.sha256(f"{DEFINITIONS}{SPELLINGS}".encode()).hexdigest()[:16]
+
+
+class UnlikeError(Exception):
+    """Two units differ in dimension."""
+
+
 @lru_cache(maxsize=1)
 def registry() -> Any:
     """pint's registry of the units in DEFINITIONS."""
@@ -83,14 +93,22 @@ def registry() -> Any:
 @lru_cache(maxsize=4096)
 def convert(value: float, unit: str, target: str) -> float:
     """Convert `value` from `unit` to `target`. Raises ValueError where the dimensions differ or a unit is unknown."""
-    import pint
-
     if len(unit) > LONGEST or not UNIT.fullmatch(unit.strip()):
         raise ValueError(f"'{unit[:LONGEST]}' is not a unit; expected something like {target or 'a bare number'}")
     try:
-        return _tidy(float(registry().Quantity(float(value), _spell(unit)).to(_spell(target)).magnitude))
-    except pint.DimensionalityError:
+        return _tidy(float(value) * factor(unit, target, EDITION, _by_pint))
+    except UnlikeError:
         raise ValueError(f"'{value:g} {unit}' is not a quantity in {target or 'bare numbers, without unit'}") from None
+
+
+def _by_pint(unit: str, target: str) -> float:
+    """Factor from `unit` to `target`. Raises UnlikeError for other dimensions, ValueError for an unknown unit."""
+    import pint
+
+    try:
+        return float(registry().Quantity(1.0, _spell(unit)).to(_spell(target)).magnitude)
+    except pint.DimensionalityError:
+        raise UnlikeError from None
     except (pint.PintError, AttributeError, TypeError, ValueError, ArithmeticError) as error:
         raise ValueError(f"'{unit}' is not a unit; expected something like {target or 'a bare number'}") from error
 
