@@ -13,7 +13,7 @@ In the running tick `p` and `s` are records in shared memory. In a test `p` may 
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import update_wrapper
+from functools import cached_property, update_wrapper
 from typing import Any
 
 import numpy as np
@@ -23,7 +23,7 @@ from pydantic.fields import FieldInfo
 
 from rtctl.config.cache import check_numba
 from rtctl.config.units import to_si
-from rtctl.step_cache import StepCache
+from rtctl.step_cache import EntryCache, StepCache
 
 check_numba()  # once, before the first function is compiled or loaded
 
@@ -44,6 +44,18 @@ def glue(function: Callable[..., Any]) -> Any:
     """Compiled step of generated code, without reference counting: code that takes memory from the heap does not
     compile."""
     return Step(function, _nrt=False)
+
+
+def entry(function: Callable[..., Any], **options: Any) -> Any:
+    """Compiled function of a generated module that Python calls, cached beside its module."""
+    made = njit(**OPTIONS, **options)(function)
+    made._cache = EntryCache(function)
+    return made
+
+
+def glue_entry(function: Callable[..., Any]) -> Any:
+    """Entry without reference counting, as `glue`."""
+    return entry(function, _nrt=False)
 
 
 class _Interpreter(threading.local):
@@ -75,10 +87,26 @@ class Step:
     def __init__(self, function: Callable[..., Any], **options: Any):
         update_wrapper(self, function)
         self.py_func = function
-        self._inner = njit(**OPTIONS, **INNER, **options)(function)
-        self._outer = njit(**OPTIONS, **options)(function)
-        self._inner._cache, self._outer._cache = StepCache(function, "inner"), StepCache(function, "outer")
-        self._numba_type_ = typeof(self._inner)  # type of the name in compiled code
+        self._options = options
+
+    @cached_property
+    def _inner(self) -> Any:
+        """For calls from compiled code. Made at first use: a process uses a few of the library's steps."""
+        made = njit(**OPTIONS, **INNER, **self._options)(self.py_func)
+        made._cache = StepCache(self.py_func, "inner")
+        return made
+
+    @cached_property
+    def _outer(self) -> Any:
+        """For calls from Python."""
+        made = njit(**OPTIONS, **self._options)(self.py_func)
+        made._cache = StepCache(self.py_func, "outer")
+        return made
+
+    @cached_property
+    def _numba_type_(self) -> Any:
+        """Type of the step's name in compiled code."""
+        return typeof(self._inner)
 
     def __call__(self, *arguments: Any) -> Any:
         return (self.py_func if INTERPRETER.runs else self._outer)(*arguments)

@@ -15,10 +15,27 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from numba.core.caching import FunctionCache
+from numba.core.runtime import rtsys
+
 from rtctl.config.cache import cache_folder
 from rtctl.config.files import replaced
 from rtctl.config.private import check, made
 from rtctl.sources import files, sources_hash
+
+
+class EntryCache(FunctionCache):
+    """numba's cache of an entry point, which loads without the registries of the compiler.
+
+    numba fills them before each load, a quarter of a second (it imports scipy.linalg to look for BLAS). Only a
+    compilation needs them, and it fills them itself. Loaded code needs the counting of references.
+    """
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """The entry point compiled for these types, or None where it is not there."""
+        rtsys.initialize(target_context)
+        with self._guard_against_spurious_io_errors():
+            return self._load_overload(sig, target_context)
 
 
 class StepCache:
@@ -40,7 +57,7 @@ class StepCache:
         try:
             from numba.core.compiler import CompileResult
 
-            target_context.refresh()
+            rtsys.initialize(target_context)
             path = self._path(sig, target_context)
             _safe(path.parent)
             kept, compiled = pickle.loads(path.read_bytes())

@@ -1,5 +1,7 @@
 """Cache of compiled steps on disk: found by equal steps of other processes only."""
 
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -102,3 +104,26 @@ def test_every_step_of_the_library_is_in_the_hash() -> None:
     names = {path.name for path in sources.files()}
     assert {"pd.py", "l292.py", "friction.py", "runner.py", "idiom.py", "step_cache.py"} <= names
     assert not {"chain.py", "main.py", "prove.py"} & names
+
+
+LOAD = """
+import importlib.util, sys
+from numba import float64
+from rtctl.idiom import entry
+spec = importlib.util.spec_from_file_location("made", sys.argv[1])
+made = sys.modules["made"] = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(made)
+made.twice.compile((float64,))
+print(made.twice(2.5), sum(made.twice._cache_hits.values()), "numba.np.linalg" in sys.modules)
+made.thrice.compile((float64,))
+print(made.thrice(2.5))
+"""
+
+
+def test_cached_entry_point_is_loaded_without_the_registries_of_the_compiler(tmp_path: Path) -> None:
+    """And a compilation after it fills them."""
+    text = "from rtctl.idiom import entry\n\n\n@entry\ndef twice(x):\n    return 2.0 * x\n"
+    path = tmp_path / "made.py"
+    path.write_text(text + "\n\nthrice = entry(lambda x: 3.0 * x)\n")
+    said = [subprocess.check_output([sys.executable, "-c", LOAD, path], text=True).split() for _ in range(2)]
+    assert said == [["5.0", "0", "True", "7.5"], ["5.0", "1", "False", "7.5"]]
