@@ -46,35 +46,38 @@ def run(
 
       rtctl run ivu.yaml --set law.position.gain=20 --set radius.source=measured
     """
-    import structlog
+    from rtctl.daemon.children import early
 
-    from rtctl.config.errors import RunFailed, UserError
-    from rtctl.config.yaml_file import told
-    from rtctl.daemon.session import Session
+    with early(*(() if mode == "fused" else ("plant",)), "loop"):  # they import while this process does
+        import structlog
 
-    def read() -> Any:
-        settings = common.load_config(config, set_)
-        return common.with_loop(common.with_reference(settings, reference), mode, link)
+        from rtctl.config.errors import RunFailed, UserError
+        from rtctl.config.yaml_file import told
+        from rtctl.daemon.session import Session
 
-    settings = read()
-    length = common.seconds(duration, "--for")
-    folder = out if out is not None else common.default_folder(settings.name)
-    console = _console(json)
-    structlog.configure(logger_factory=lambda *_: structlog.PrintLogger(console.log))  # stdout is for JSON
-    console.say(told(config))
-    session = Session(settings, folder, length, arm=arm, say=console.say, reread=read)
-    failure = None
-    try:
-        with console.live():
-            result = session.run(console.update)
-    except (RunFailed, UserError) as error:
-        if session.result is None:
-            raise
-        failure, result = error, session.result
-    except KeyboardInterrupt:
-        if not session.supervisor.terminal_gone:
-            raise
-        raise typer.Exit(HUNG_UP) from None
+        def read() -> Any:
+            settings = common.load_config(config, set_)
+            return common.with_loop(common.with_reference(settings, reference), mode, link)
+
+        settings = read()
+        length = common.seconds(duration, "--for")
+        folder = out if out is not None else common.default_folder(settings.name)
+        console = _console(json)
+        structlog.configure(logger_factory=lambda *_: structlog.PrintLogger(console.log))  # stdout is for JSON
+        console.say(told(config))
+        session = Session(settings, folder, length, arm=arm, say=console.say, reread=read)
+        failure = None
+        try:
+            with console.live():
+                result = session.run(console.update)
+        except (RunFailed, UserError) as error:
+            if session.result is None:
+                raise
+            failure, result = error, session.result
+        except KeyboardInterrupt:
+            if not session.supervisor.terminal_gone:
+                raise
+            raise typer.Exit(HUNG_UP) from None
     if session.supervisor.terminal_gone:
         raise typer.Exit(HUNG_UP)
     if plot:

@@ -1,7 +1,7 @@
 """Common parts of the loop's and the plant's process: orders, reports, and a watch on the supervisor.
 
-Orders are one JSON object on the command line. Reports are JSON lines on standard output. Standard input is a pipe
-from the supervisor that carries nothing: its end means that the supervisor is gone.
+Standard input is a pipe from the supervisor. Its first line are the orders, one JSON object; its end means that the
+supervisor is gone. Reports are JSON lines on standard output.
 """
 
 import contextlib
@@ -34,9 +34,15 @@ LINK_WAITING = 256
 CUT_MS = 1000
 
 
-def orders(argv: list[str]) -> dict[str, Any]:
-    """The orders of this process, from its command line."""
-    return json.loads(argv[1])
+def orders() -> dict[str, Any]:
+    """The orders of this process, from standard input. Raises SystemExit where the supervisor ends without any."""
+    line = b""
+    while not line.endswith(b"\n"):  # no buffer: `watch_parent` waits for the end of the same pipe
+        part = os.read(sys.stdin.fileno(), 65536)
+        if not part:
+            raise SystemExit(0)
+        line += part
+    return json.loads(line)
 
 
 def report(event: str, **values: Any) -> None:

@@ -1,10 +1,15 @@
-"""Child processes of the supervisor: start of the loop and the plant, and their reports."""
+"""Child processes of the supervisor: start of the loop and the plant, their orders and their reports.
+
+A child imports for half a second before it needs its orders. `early` starts children before the orders are known.
+"""
 
 import contextlib
 import json
 import os
 import subprocess
 from collections import deque
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from rtctl.config.isolated import python
@@ -13,14 +18,14 @@ from rtctl.config.isolated import python
 class ChildProcess:
     """One child process: its input pipe, its reports and its last error output. The child ends when the pipe closes."""
 
-    def __init__(self, role: str, order: dict[str, Any]):
+    def __init__(self, role: str):
         self.role = role
-        self.order = order
+        self.order: dict[str, Any] = {}
         self._partial = b""
         self._errors: deque[str] = deque(maxlen=20)
         environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
         self.process = subprocess.Popen(
-            python("-m", f"rtctl.daemon.{role}_process", json.dumps(order)),
+            python("-m", f"rtctl.daemon.{role}_process"),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
@@ -29,6 +34,14 @@ class ChildProcess:
         for stream in (self.process.stdout, self.process.stderr):
             assert stream is not None
             os.set_blocking(stream.fileno(), False)
+
+    def begin(self, order: dict[str, Any]) -> None:
+        """Send the orders, as one line of JSON. A child that has died is noticed by `running`."""
+        self.order = order
+        assert self.process.stdin is not None
+        with contextlib.suppress(BrokenPipeError):
+            self.process.stdin.write(json.dumps(order).encode() + b"\n")
+            self.process.stdin.flush()
 
     @property
     def pid(self) -> int:
@@ -80,3 +93,31 @@ def _read(fd: int) -> bytes | None:
         return os.read(fd, 65536)
     except (BlockingIOError, ValueError):
         return None
+
+
+_waiting: dict[str, ChildProcess] = {}  # children without orders, by role
+
+
+@contextmanager
+def early(*roles: str) -> Iterator[None]:
+    """Start children of these roles now; `start_child` takes them. Those that wait at the end are ended."""
+    _waiting.update({role: ChildProcess(role) for role in roles})
+    try:
+        yield
+    finally:
+        dismiss()
+
+
+def start_child(role: str, order: dict[str, Any]) -> ChildProcess:
+    """Child with these orders: the one that waits, or a new one."""
+    child = _waiting.pop(role, None)
+    if child is None or not child.running():
+        child = ChildProcess(role)
+    child.begin(order)
+    return child
+
+
+def dismiss() -> None:
+    """End the children that still wait for orders."""
+    while _waiting:
+        _waiting.popitem()[1].stop(0.0)

@@ -3,12 +3,11 @@
 import time
 from typing import TYPE_CHECKING, Any
 
-import structlog
-
 from rtctl import machines
 from rtctl.config.errors import UserError
 from rtctl.config.load import get_path, set_path
 from rtctl.config.units import convert
+from rtctl.daemon.log import log
 from rtctl.daemon.protocol import Args
 from rtctl.idiom import fill_record
 from rtctl.loop import generate
@@ -18,7 +17,6 @@ from rtctl.tick import safety
 if TYPE_CHECKING:
     from rtctl.daemon.supervisor import Supervisor
 
-log = structlog.get_logger()
 SWITCHED = (
     "loop", "link", "driver", "record", "commands", "board", "plant", "name", "machine", "reference", "excitation",
     "faults", "metrics", "own", "live", "sensors", "encoder", "output", "amplifier", "R_c",

@@ -14,11 +14,9 @@ import subprocess
 from pathlib import Path
 from typing import Any
 
-import structlog
-
 from rtctl.config.isolated import python
+from rtctl.daemon.log import log
 
-log = structlog.get_logger()
 COMMANDERS = 64  # connections at the command socket; a further one replaces the one silent for longest
 VIEWERS = 32  # connections at telemetry, and at the rows; a further one is refused
 WAITING = 128  # connections that may wait to be accepted

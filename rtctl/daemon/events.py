@@ -4,12 +4,11 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import structlog
 
+from rtctl.daemon.log import log
 from rtctl.machines.base import COMMON_COLUMNS
 from rtctl.tick import safety
 
-log = structlog.get_logger()
 COMMON = {column.name for column in COMMON_COLUMNS} - {"watchdog", "lateness"}
 
 

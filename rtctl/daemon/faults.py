@@ -13,20 +13,19 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import structlog
 from pydantic import ValidationError
 
 from rtctl.config import complaints
 from rtctl.config.errors import UserError
 from rtctl.config.isolated import python
-from rtctl.daemon.children import ChildProcess
+from rtctl.daemon import children
+from rtctl.daemon.log import log
 from rtctl.tick import faults
 from rtctl.trace.recorder import Recorder
 
 if TYPE_CHECKING:
     from rtctl.daemon.supervisor import Supervisor
 
-log = structlog.get_logger()
 FLUSH = 5.0  # s of wall clock for which virtual time waits for the recorder, so that a disk is full at a given tick
 BUSY = "import os,threading as t; t.Thread(target=lambda: os.read(0, 1) or os._exit(0)).start()\nwhile True: pass"
 Undo = Callable[[], None]
@@ -172,7 +171,7 @@ class Faults:
             slot["count"] += 1
         self._of.segment["plant_status"][0]["ended"] = 0
         dead.stop()
-        self._of.plant = ChildProcess("plant", dead.order)
+        self._of.plant = children.start_child("plant", dead.order)
         self._of.children[self._of.children.index(dead)] = self._of.plant
         self._of._plant_died = False
 

@@ -15,15 +15,14 @@ import threading
 from pathlib import Path
 from typing import NamedTuple
 
-import structlog
 import zmq
 from platformdirs import user_config_path
 from zmq.auth import load_certificate
 from zmq.utils import z85
 
 from rtctl.config.errors import UserError
+from rtctl.daemon.log import log
 
-log = structlog.get_logger()
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,63}")
 
 

@@ -1,4 +1,4 @@
-"""The loop's process: `python -m rtctl.daemon.loop_process ORDERS`, started by the supervisor.
+"""The loop's process: `python -m rtctl.daemon.loop_process`, started by the supervisor, with orders on standard input.
 
 The Python interpreter runs before and after the compiled loop, and on virtual time between blocks of ticks.
 """
@@ -20,9 +20,9 @@ from rtctl.tick import frames
 FOREVER = 2**62
 
 
-def main(argv: list[str]) -> int:
+def main() -> int:
     """Run the loop as ordered and return the exit code; reports `compiling`, `lacks` and `ended`. Raises UserError."""
-    order = child.orders(argv)
+    order = child.orders()
     machine = child.machine_from(order)
     loop = machine.config.loop
     made = generate.generate(machine, order["link"])
@@ -107,7 +107,7 @@ def _wait_for_plant(
 
 if __name__ == "__main__":
     try:
-        sys.exit(main(sys.argv))
+        sys.exit(main())
     except UserError as error:
         child.report("error", message=str(error), code=2)
         sys.exit(2)

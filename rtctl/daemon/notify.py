@@ -10,9 +10,8 @@ import socket
 import time
 from collections.abc import Callable, MutableMapping
 
-import structlog
+from rtctl.daemon.log import log
 
-log = structlog.get_logger()
 GOOD_TICKS = 100  # consecutive ticks in time before a machine is ready; below 100 Hz the ticks of one second
 SEND_TIMEOUT = 1.0  # s to wait for the service manager, so that a hung manager does not delay the recording
 

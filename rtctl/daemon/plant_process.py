@@ -1,6 +1,7 @@
 """The process at the plant's end of the link: an emulated machine, a real board, or an FMU.
 
-`python -m rtctl.daemon.plant_process ORDERS`, started by the supervisor, or `rtctl plant CONFIG`.
+`python -m rtctl.daemon.plant_process`, started by the supervisor with orders on standard input; or
+`rtctl plant CONFIG`.
 """
 
 import contextlib
@@ -100,9 +101,9 @@ def _wait_for_hello(socket: zmq.Socket, status: Any) -> None:
                 return
 
 
-def main(argv: list[str]) -> int:
+def main() -> int:
     """Serve the plant as ordered by the supervisor; returns the exit code."""
-    order = child.orders(argv)
+    order = child.orders()
     machine = child.machine_from(order)
     made = generate.generate(machine, order["link"])
     segment = child.segment_from(order, made)
@@ -138,7 +139,7 @@ def alone(machine: Machine, endpoint: str, announce: Any, later: tuple[Machine, 
 
 if __name__ == "__main__":
     try:
-        sys.exit(main(sys.argv))
+        sys.exit(main())
     except UserError as error:
         child.report("error", message=str(error), code=2)
         sys.exit(2)

@@ -15,7 +15,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Literal, Protocol, TypeVar
 
-import structlog
 import zmq
 
 from rtctl import __version__
@@ -25,9 +24,9 @@ from rtctl.config.private import SOCKETS, check
 from rtctl.daemon.client import Client
 from rtctl.daemon.doors import Door, listen_ipc, listen_tcp
 from rtctl.daemon.keys import ServerCurve, apply_server, refuse_open, require_curve
+from rtctl.daemon.log import log
 from rtctl.daemon.protocol import VERSIONS, Args, ProtocolError, decode_request, encode_error, encode_result
 
-log = structlog.get_logger()
 SYSTEM_DIR = Path("/run/rtctl")
 TEMPORARY_DIR = Path("/tmp")
 MAX_SOCKET_PATH = 107  # bytes; sockaddr_un holds 108 with the closing zero

@@ -14,7 +14,6 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-import structlog
 import zmq
 
 from rtctl import machines
@@ -24,11 +23,12 @@ from rtctl.daemon import ending, shared_memory
 from rtctl.daemon.answers import Answers
 from rtctl.daemon.captures import Captures
 from rtctl.daemon.case import describe
-from rtctl.daemon.children import ChildProcess
+from rtctl.daemon.children import ChildProcess, dismiss, start_child
 from rtctl.daemon.commands import Commands
 from rtctl.daemon.events import Recording, Trips
 from rtctl.daemon.faults import Faults
 from rtctl.daemon.lock import MachineLock
+from rtctl.daemon.log import log
 from rtctl.daemon.notify import Service
 from rtctl.daemon.outside import Outside
 from rtctl.daemon.reload import reload
@@ -46,7 +46,6 @@ from rtctl.trace.orders import Journal
 from rtctl.trace.recorder import Recorder
 from rtctl.trace.rotation import Rotation
 
-log = structlog.get_logger()
 TURN_MS = 10  # ms between two turns of the supervisor on the wall clock
 FOREVER = 1e9  # s for which a loop waits for the supervisor's plant, which may compile; its death is noticed
 
@@ -164,11 +163,12 @@ class Supervisor(Answers):
         self.plant: ChildProcess | None = None
         stack.callback(self._stop_children)
         if config.loop.mode != "fused" and link.spawns:
-            self.plant = ChildProcess("plant", order)
+            self.plant = start_child("plant", order)
             self.children.append(self.plant)
             order["patience"] = FOREVER
-        self.loop = ChildProcess("loop", order)
+        self.loop = start_child("loop", order)
         self.children.append(self.loop)
+        dismiss()
         self._wait_for_first_tick()
 
     def _wait_for_first_tick(self) -> None:

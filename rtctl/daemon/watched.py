@@ -3,9 +3,8 @@
 import time
 from typing import Any
 
-import structlog
+from rtctl.daemon.log import log
 
-log = structlog.get_logger()
 SILENT = 10.0  # s without a report, after which a watch counts as ended
 
 

@@ -6,17 +6,16 @@ import json
 import math
 from typing import TYPE_CHECKING, Any
 
-import structlog
 from aiohttp import web
 
 from rtctl.config.errors import UserError
+from rtctl.daemon.log import log
 from rtctl.scope.view import MOST_BYTES, read_view
 from rtctl.scope.viewer import Viewer
 
 if TYPE_CHECKING:
     from rtctl.scope.server import Scope
 
-log = structlog.get_logger()
 COMMANDS = ("arm", "disarm", "reset", "play", "setpoint", "set")  # commands to the daemon that the page may send
 MOST_WAITING = 100  # unsent messages, above which the connection is closed
 

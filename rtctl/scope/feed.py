@@ -6,17 +6,16 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
-import structlog
 import zmq
 
 from rtctl.config.errors import UserError
 from rtctl.daemon.client import Client, listens
+from rtctl.daemon.log import log
 from rtctl.daemon.rows import MESSAGES_WAITING, decode
 from rtctl.daemon.server import find_endpoint
 from rtctl.scope.history import MOST_ROWS, MOST_SECONDS, History
 from rtctl.scope.lanes import Lanes
 
-log = structlog.get_logger()
 TIMEOUT = 1.0  # s to wait for an answer of the daemon
 EDGES_US = [2.0**k for k in range(-2, 15)]  # bin edges of the lateness histogram, us
 
