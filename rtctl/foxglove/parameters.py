@@ -12,6 +12,7 @@ from foxglove.websocket import Client as Viewer
 from foxglove.websocket import ServerListener
 
 from rtctl.config.errors import UserError
+from rtctl.daemon.client import CommandError
 
 SECTIONS = ("law", "radius", "safety")  # sections of the config that can change while a machine runs
 SETPOINT = "setpoint"
@@ -77,8 +78,8 @@ class Parameters(ServerListener):
         for section in SECTIONS:
             try:
                 value = self._client.call("get", path=section)["value"]
-            except UserError as error:
-                if "unknown key" not in str(error):
+            except CommandError as error:
+                if error.code != "refused":
                     raise
                 continue  # this machine has no such section
             _flatten(section, value, found)
