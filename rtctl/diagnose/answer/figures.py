@@ -79,11 +79,12 @@ def _curves(ax, d: GraphDiagnosis, runs: Missing, term: str, node: str, axis: st
         half = max(half, _middle(band))
     free = d.decided.unlisted
     if not term and d.located is not None and free is not None and axis == free.axis:
-        inside, value = across * free.knots, free.value
-        if c.x_unit == "degrees":
-            inside = np.min(c.x) + np.mod(np.degrees(free.knots) - np.min(c.x), TURN)
-            inside, value = np.sort(inside), value[np.argsort(inside)]
-        ax.plot(inside, scale * value, color=AFTER, lw=1.5, marker="s", ms=3, label="free function that fits best")
+        # at the rows only: a knot without rows beside it may have any value
+        at = np.sort(np.concatenate([found[k][0][np.isfinite(found[k][0])] for k in both]))
+        turn = c.x_unit == "degrees"
+        knots = np.degrees(free.knots) if turn else free.knots
+        value = np.interp(at, knots, free.value, period=TURN if turn else None)
+        ax.plot(across * at, scale * value, color=AFTER, lw=1.5, label="free function that fits best")
     ax.axhline(0, color=SEEN, lw=0.8)
     top = scale * (1.4 * max(size, law) + half)
     ax.set_ylim(-top or -1.0, top or 1.0)
