@@ -12,6 +12,10 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from rtctl.config.arithmetic import equal_digits
+
+equal_digits()  # before numpy is loaded
+
 import numpy as np
 import pytest
 import yaml

@@ -20,6 +20,8 @@ from typing import Any
 
 from real_cases import FOLDER, ROOT, bundle, cases, imports, missing
 
+from rtctl.config.arithmetic import equal_digits
+
 FOUND = FOLDER / "found"
 IMAGES = ROOT / "docs" / "images" / "real"
 DIGITS = 3
@@ -130,6 +132,7 @@ def main() -> None:
     parser.add_argument("--table", action="store_true")
     parser.add_argument("--here", action="store_true", help=argparse.SUPPRESS)
     args = parser.parse_args()
+    equal_digits()
     listed = cases()
     if args.table:
         PAGE.write_text(page(PAGE.read_text()))

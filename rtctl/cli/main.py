@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from rtctl.cli.lazy import LazyGroup
+from rtctl.config.arithmetic import equal_digits
 from rtctl.config.errors import NoAnswer, RunFailed, UserError
 from rtctl.config.failures import told
 from rtctl.config.isolated import isolate
@@ -90,6 +91,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     if arguments is None:  # called as the program; a caller with arguments keeps its own sys.path
         isolate()
+        equal_digits()
     try:
         code = app(arguments, prog_name="rtctl", standalone_mode=False) or 0
         sys.stdout.flush()  # a full disk is reported here; the interpreter's flush at exit has no message for it

@@ -1,0 +1,34 @@
+"""Equal digits on every processor.
+
+OpenBLAS, the linear algebra of numpy and scipy, has kernels for each processor, and they add in different orders. The
+search of a diagnosis compares candidates that may be nearly equal, so that the last digits can decide on its way: with
+the kernels for AVX-512 the EMPS axis was `ambiguous`, with those for AVX2 `named`. All processors since 2013 have AVX2.
+
+Source: OpenBLAS, DYNAMIC_ARCH and the variable OPENBLAS_CORETYPE.
+"""
+
+import os
+import platform
+import sys
+from collections.abc import MutableMapping
+from pathlib import Path
+
+VARIABLE, KERNELS = "OPENBLAS_CORETYPE", "Haswell"
+NEEDED = {"avx2", "fma"}
+FIRST = 8192  # bytes of /proc/cpuinfo that hold the flags of the first processor
+
+
+def equal_digits(environment: MutableMapping[str, str] = os.environ, cpuinfo: Path = Path("/proc/cpuinfo")) -> None:
+    """Choose the kernels for AVX2, in this process and those that it starts. A choice of the caller stays.
+
+    No effect on another architecture, on a processor without AVX2, or once numpy is loaded.
+    """
+    if "numpy" in sys.modules or platform.machine() != "x86_64":
+        return
+    try:
+        with cpuinfo.open() as file:
+            flags = next((line for line in file.read(FIRST).splitlines() if line.startswith("flags")), "")
+    except OSError:
+        return
+    if set(flags.split()) >= NEEDED:
+        environment.setdefault(VARIABLE, KERNELS)
