@@ -1,9 +1,13 @@
-"""The mark `long` for a part of the parameters of a test."""
+"""Marks of long tests. CI runs those with the mark `long`; RTCTL_PROOF=full runs those with the mark `full` as well."""
 
+import os
 from collections.abc import Callable, Iterable
 from typing import Any
 
 import pytest
+
+FULL = os.environ.get("RTCTL_PROOF") == "full"
+full = pytest.mark.skipif(not FULL, reason="takes a minute of computing; RTCTL_PROOF=full runs it")
 
 
 def long_where(is_long: Callable[[Any], bool], values: Iterable[Any]) -> list[Any]:

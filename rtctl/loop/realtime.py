@@ -26,7 +26,7 @@ class Lack(NamedTuple):
 
 class RealTime:
     """Real-time settings of the calling thread. `lacks` lists refused settings. Keep the object: CPU sleep states stay
-    limited until `close`."""
+    limited, and memory locked, until `close`."""
 
     def __init__(self, priority: int, cpu: int | None):
         self.lacks: list[Lack] = []
@@ -94,6 +94,9 @@ class RealTime:
             )
 
     def close(self) -> None:
+        """Undo what outlives the thread: locked memory, frozen objects, the limit on sleep states."""
+        ctypes.CDLL(None).munlockall()
+        gc.unfreeze()
         if self._dma_latency is not None:
             os.close(self._dma_latency)
             self._dma_latency = None

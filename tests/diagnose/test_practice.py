@@ -1,15 +1,14 @@
 """Practice bundles with known answers, beside the project.
 
-RTCTL_PROOF=full diagnoses all of them; the default is three shortened bundles.
+RTCTL_PROOF=full diagnoses all of them; the default is two shortened bundles.
 """
 
 import json
-import os
 from pathlib import Path
 from typing import Any
 
 import pytest
-from marks import long_where
+from marks import FULL, long_where
 
 from rtctl.diagnose.answer.answer import GraphDiagnosis, diagnose, diagnose_record
 from rtctl.diagnose.answer.results import finite
@@ -18,8 +17,7 @@ from rtctl.diagnose.model.recording import GraphRecord
 from rtctl.diagnose.record.format1 import load_record
 from rtctl.proof.score import score
 
-FULL = os.environ.get("RTCTL_PROOF") == "full"
-LENGTHS = {"case-0018": 6.0, "case-0020": 10.0, "case-0006": 2.5}  # s; nothing, and two single effects
+LENGTHS = {"case-0018": 6.0, "case-0020": 10.0}  # s; nothing, and a single effect
 QUICK = "case-0018"  # nothing is missing: no search for a second effect
 VISIBLE = 0.3  # times the noise floor
 

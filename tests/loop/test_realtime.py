@@ -1,6 +1,9 @@
 import ctypes
 import os
+import re
+import threading
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -23,6 +26,7 @@ class Kernel:
         patch.setattr(os, "sched_getaffinity", lambda pid: self.cpus)
         patch.setattr(ctypes, "CDLL", lambda *_, **__: self)
         patch.setattr(realtime.gc, "freeze", lambda: None)
+        patch.setattr(realtime.gc, "unfreeze", lambda: None)
         opened, written = os.open, os.write
         patch.setattr(
             os, "open", lambda path, *a, **k: self._latency() if "latency" in str(path) else opened(path, *a, **k)
@@ -38,6 +42,10 @@ class Kernel:
     def mlockall(self, flags: int) -> int:
         self.asked["lock"] = flags
         return -1 if "lock" in self.refuses else 0
+
+    def munlockall(self) -> int:
+        self.asked["unlock"] = True
+        return 0
 
     def _ask(self, what: str, value: Any) -> None:
         if what in self.refuses:
@@ -56,10 +64,10 @@ def test_real_time_setup_makes_all_requests(kernel: Kernel) -> None:
     assert made.lacks == []
     assert kernel.asked["fifo"] == (os.SCHED_FIFO, 80)
     assert kernel.asked["lock"] == 3 and kernel.asked["pin"] == {2}
-    assert kernel.asked["zero"] == bytes(4) and "closed" not in kernel.asked
+    assert kernel.asked["zero"] == bytes(4) and not {"closed", "unlock"} & set(kernel.asked)
     made.close()
     made.close()
-    assert kernel.asked["closed"] == -7
+    assert kernel.asked["closed"] == -7 and kernel.asked["unlock"]
 
 
 @pytest.mark.parametrize(
@@ -87,3 +95,12 @@ def test_single_cpu_is_reported_unless_it_was_chosen(kernel: Kernel) -> None:
     (lack,) = RealTime(80, None).lacks
     assert lack.what == "one CPU only"
     assert RealTime(80, 0).lacks == [] and kernel.asked["pin"] == {0}
+
+
+def test_memory_of_the_process_is_unlocked_at_the_end() -> None:
+    """Locked memory would be filled at every allocation, for the rest of the process."""
+    thread = threading.Thread(target=lambda: RealTime(1, None).close())
+    thread.start()
+    thread.join()
+    status = Path("/proc/self/status").read_text()
+    assert re.search(r"VmLck:\s+0 kB", status)

@@ -4,6 +4,7 @@ from functools import cache
 import numpy as np
 import pytest
 from graph_cases import PENDULUM, case_of, command, named, nothing, record
+from marks import full
 
 from rtctl.diagnose.likelihood.bandwidth import lags, quicker
 from rtctl.diagnose.likelihood.fits import refit
@@ -45,7 +46,7 @@ def test_observer_bandwidth_is_limited_by_the_tick_rate():
     assert like.following(2.0).rows == like.rows
 
 
-@pytest.mark.long
+@full
 def test_all_models_of_a_search_use_its_final_observer(monkeypatch):
     monkeypatch.setattr("rtctl.diagnose.search.search.quicker", lambda fit: 2.0)
     like, space = named().found.like, named().found.base.space

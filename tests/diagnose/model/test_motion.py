@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 from described_machines import ROD, ROTOR, case_of, moved, record, rounded
+from marks import full
 
 from rtctl.config.errors import NoAnswer, UserError
 from rtctl.diagnose.answer.answer import diagnose_record
@@ -87,7 +88,7 @@ def test_initial_position_and_speed_of_a_free_response_are_estimated():
     assert d.parameters["start.speed"].value == pytest.approx(2.0, abs=0.1)
 
 
-@pytest.mark.long
+@full
 def test_pendulum_described_as_a_spring_gets_a_softening_or_gravity():
     spring = {"bodies": {"rod": {"inertia": 3.3e-3, "viscous": 3e-4}}, "sensors": ROD["sensors"],
               "joints": {"k": {"from": "frame", "to": "rod", "stiffness": 0.2206}}}  # fmt: skip

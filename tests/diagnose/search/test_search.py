@@ -1,5 +1,5 @@
-import pytest
 from graph_cases import BELT, RUB, case_of, command, named, record
+from marks import full
 
 from rtctl.diagnose.answer.answer import diagnose_record
 from rtctl.diagnose.search.search import ALIKE, apart, likeness
@@ -7,7 +7,7 @@ from rtctl.diagnose.search.search import ALIKE, apart, likeness
 OFFSET = {"term": "drive.offset", "node": "amplifier", "offset": 0.03}
 
 
-@pytest.mark.long
+@full
 def test_two_effects_are_found_together():
     found = diagnose_record(record(case_of(BELT), command(0.6), [RUB, OFFSET])).found
     assert "friction.coulomb:carriage" in found.best.names
