@@ -1,9 +1,9 @@
 """Equal digits on every processor.
 
-OpenBLAS, the linear algebra of numpy and scipy, has kernels for each processor, and they add in different orders. The
-search of a diagnosis compares candidates that may be nearly equal, so that the last digits can decide on its way: with
-the kernels for AVX-512 the EMPS axis was `ambiguous`, with those for AVX2 `named`. Nearly every x86 processor since
-2013 has AVX2.
+OpenBLAS, the linear algebra of numpy and scipy, has kernels for each processor. The kernels add in different orders,
+so results differ in the last digits. A diagnosis ranks candidates of nearly equal likelihood, and the last digits can
+change the ranking: the EMPS axis was `ambiguous` with the kernels for AVX-512 and `named` with those for AVX2. Nearly
+every x86 processor since 2013 has AVX2.
 
 Source: OpenBLAS, DYNAMIC_ARCH and the variable OPENBLAS_CORETYPE.
 """

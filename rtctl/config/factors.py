@@ -1,6 +1,6 @@
 """Factors between units, kept in the cache folder.
 
-Nearly every command reads a config with units, and loading pint for them takes 0.1 s. A factor is worked out once.
+Nearly every command reads a config with units, and loading pint takes 0.1 s. Each factor is computed once.
 """
 
 import json
@@ -12,7 +12,7 @@ from pathlib import Path
 
 from rtctl.config.cache import cache_folder
 from rtctl.config.errors import UserError
-from rtctl.config.files import replaced
+from rtctl.config.files import write_text
 from rtctl.config.private import made
 
 MOST = 2000  # factors in the file; units of imported files could fill it without end
@@ -45,9 +45,7 @@ def _kept(edition: str) -> dict[str, float]:
 def _keep(edition: str, kept: dict[str, float]) -> None:
     with suppress(OSError, UserError):
         path = _path(edition)
-        made(path.parent)
-        with replaced(path) as file:
-            json.dump(kept, file)
+        write_text(made(path.parent) / path.name, json.dumps(kept))
 
 
 def _path(edition: str) -> Path:

@@ -1,4 +1,4 @@
-"""The daemon's log. structlog loads with the first message: loop and plant seldom write one, and it takes 60 ms."""
+"""Log of the daemon. structlog takes 60 ms to import and is loaded with the first message; most processes log none."""
 
 from typing import Any
 

@@ -53,7 +53,7 @@ def main() -> int:
     if loop.mode == "fused":
         run.virtual(ticks)
     else:
-        _wait_for_plant(socket, run, order["patience"], order["endpoint"], loop.mode, machine.config.link.keys)
+        _wait_for_plant(socket, run, order["patience"], order["endpoint"], machine.config.link.keys)
         if loop.mode == "lockstep":
             run.virtual(ticks)
         else:
@@ -73,9 +73,7 @@ def main() -> int:
     return 0
 
 
-def _wait_for_plant(
-    socket: zmq.Socket | None, run: Loop, timeout: float, endpoint: str, mode: str, key_name: str | None
-) -> None:
+def _wait_for_plant(socket: zmq.Socket | None, run: Loop, timeout: float, endpoint: str, key_name: str | None) -> None:
     """Send hello frames until the plant answers. Raises UserError after `timeout` s without an answer."""
     deadline = time.monotonic() + timeout
     hello = generate.new_frames()["tx"]
@@ -89,11 +87,6 @@ def _wait_for_plant(
         with contextlib.suppress(zmq.Again):
             socket.send(hello.tobytes(), zmq.DONTWAIT)
         if socket.poll(200, zmq.POLLIN):
-            if mode == "real":  # drop old samples
-                while socket.poll(0):
-                    socket.recv()
-                if not socket.poll(200):
-                    continue
             return
     if time.monotonic() < deadline:
         return  # stop was ordered

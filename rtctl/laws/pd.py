@@ -16,6 +16,7 @@ from math import exp, pi
 from typing import NamedTuple
 
 from rtctl.idiom import Settings, quantity, state, tick
+from rtctl.laws import velocity
 
 
 class PdSettings(Settings):
@@ -70,10 +71,7 @@ def step(p, s, e, passed=1):
     if s.primed == 0:
         s.e = e
         s.primed = 1
-    slope = (e - s.e) / p.dt
-    if passed != 1:  # a branch, as in `velocity`
-        slope /= passed
-    s.d += p.a * (slope - s.d)
+    s.d += p.a * (velocity.slope(e - s.e, p.dt, passed) - s.d)
     s.e = e
     return p.gain * e + p.D * s.d
 

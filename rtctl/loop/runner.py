@@ -263,8 +263,8 @@ def virtual(st, tables, ring_, rows, p, s, c, y, m, f, tx, rx, held, period, lat
 def meet(st, out, inp, held, rx, rx_staged, period):
     """Exchange outputs that are off until the plant answers one of them, for at most half a second.
 
-    Samples that queued while the loop was compiled are used up here. If the first ticks answered them, the board's
-    watchdog would take these outputs for late ones.
+    Discards samples that queued while the loop was compiled. The board's watchdog switches off outputs that answer
+    an old sample, which would trip the first ticks.
     """
     begun = clock.now()
     wake = begun

@@ -150,7 +150,7 @@ USES = (
 )
 LAW_SIGNALS = {
     "e": "y.position_error", "x": "y.x", "v": "y.speed", "ref": "y.ref", "v_ref": "s.shaper.speed",
-    "a_ref": "s.shaper.acceleration", "u": "y.u", "passed": "passed",
+    "a_ref": "s.shaper.acceleration", "u": "y.u",
 }  # fmt: skip
 TRACKED = {"u_wanted": "y.u_c", "u_written": "u"}
 TRUTH = (

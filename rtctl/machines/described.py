@@ -88,7 +88,6 @@ def diagram(config: Any, dt: float) -> Diagram:
     signals = {
         "e": "y.position_error", "x": "y.feedback", "v": rate, "ref": "y.ref", "v_ref": "s.shaper.speed",
         "a_ref": "s.shaper.acceleration", "u": f"p.machine.shares[{number}] * y.{column}",
-        "passed": "passed",
     }  # fmt: skip
     asked = "y.u_c" if law.compensation.inverse is None else "asked"
     position = own_law.lines(law.position, "u_fb", signals, {"u_wanted": asked, "u_written": "u"})

@@ -10,7 +10,6 @@ COMMAND, TRACK = "<command>", "<compensation after the limits>"
 LAW_SIGNALS = {
     "e": "y.capstan_error", "x": "y.capstan", "v": "y.capstan_speed", "ref": "y.ref", "v_ref": "s.shaper.speed",
     "a_ref": "s.shaper.acceleration", "u": "y.u_c", "R1": "y.R1", "R2": "y.R2",
-    "passed": "passed",
 }  # fmt: skip
 WRITTEN = "min(max(y.u_c, p.limit.low), p.limit.high)"
 NAMES = compensation.Signals(

@@ -227,7 +227,7 @@ COLUMNS = (
 
 LAW_SIGNALS = {
     "e": "y.position_error", "x": "y.position", "v": "y.speed", "ref": "y.ref", "v_ref": "s.shaper.speed",
-    "a_ref": "s.shaper.acceleration", "u": "y.u", "passed": "passed",
+    "a_ref": "s.shaper.acceleration", "u": "y.u",
 }  # fmt: skip
 
 

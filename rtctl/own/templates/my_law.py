@@ -6,8 +6,7 @@
 e is the position error in rad, u the command in V; d is the derivative of e in rad/s. A tick takes dt s;
 n periods have passed since the previous one: 1, or more after missed ticks.
 
-The arguments of `step` after p and s select its signals by name: e, and any of x, v, ref, v_ref, a_ref, u,
-passed.
+The arguments of `step` after p and s select its signals by name: e, and any of x, v, ref, v_ref, a_ref, u, passed.
 `rtctl check` reports a name that the machine does not have. Limits and trips act after this law; it cannot bypass them.
 """
 
